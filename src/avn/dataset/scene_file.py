@@ -1,0 +1,126 @@
+"""The container of the scene files: HDF5 behind a header that tells whether it is whole.
+
+The first 512 bytes (HDF5 calls them the user block) hold the length and the CRC-32 of all that
+follows, so that a file cut short or with a changed byte is told from a good one; any HDF5 tool
+reads the rest.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from avn.errors import UserError
+from avn.stages import written_whole
+
+_BLOCK = 512
+_CHUNK = 1 << 24
+_HEADER = re.compile(rb"AVN scene file, (\d+) bytes with CRC-32 ([0-9a-f]{8}) follow\n\0*")
+_MEND = "delete it and run `python -m avn.generate` to make it again"
+
+
+def write(
+    path: Path, kind: str, version: int, made_from: str, fill: Callable[[h5py.File], None]
+) -> None:
+    """Write a scene file under a temporary name and rename it when it is whole.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file shall lie.
+    kind, version : str, int
+        What it holds, and the version of that format.
+    made_from : str
+        Hash of everything its content depends on.
+    fill : callable
+        Writes the datasets into the open file.
+    """
+    with written_whole(path) as part:
+        with h5py.File(part, "w", userblock_size=_BLOCK, libver="v110") as file:
+            file.attrs["kind"] = kind
+            file.attrs["version"] = version
+            file.attrs["made_from"] = made_from
+            fill(file)
+        size, crc = _measure(part)
+        header = f"AVN scene file, {size} bytes with CRC-32 {crc:08x} follow\n".encode()
+        with part.open("r+b") as raw:
+            raw.write(header.ljust(_BLOCK, b"\0"))
+
+
+def open_checked(path: Path, kind: str, version: int, made_from: str | None = None) -> h5py.File:
+    """Open a scene file for reading, once it has shown to be whole and of the right making.
+
+    Parameters
+    ----------
+    made_from : str, optional
+        The hash that it must carry; None takes any.
+
+    Raises
+    ------
+    UserError
+        Where it is missing, cut short, changed, of another kind, version or making.
+    """
+    if not path.is_file():
+        raise UserError(f"{path}: no such scene file; run `python -m avn.generate` to make it")
+    file = None
+    try:
+        file = h5py.File(path, "r")
+        _check(dict(file.attrs), path, kind, version, made_from)
+    except UserError:
+        file.close()
+        raise
+    except (OSError, KeyError, RuntimeError, ValueError) as error:  # what h5py makes of damage
+        if file is not None:
+            file.close()
+        raise UserError(f"{path}: {_damage(path) or 'not an HDF5 file'}; {_MEND}") from error
+    return file
+
+
+def _check(
+    marks: dict[str, Any], path: Path, kind: str, version: int, made_from: str | None
+) -> None:
+    if marks.get("kind") != kind:
+        raise UserError(f"{path}: holds '{marks.get('kind')}', not '{kind}'; {_MEND}")
+    if marks.get("version") != version:
+        raise UserError(
+            f"{path}: format version {marks.get('version')}, but this avn reads version "
+            f"{version}; {_MEND}"
+        )
+    if damage := _damage(path):
+        raise UserError(f"{path}: {damage}; {_MEND}")
+    if made_from is not None and marks.get("made_from") != made_from:
+        raise UserError(f"{path}: made from another floor plan or other settings; {_MEND}")
+
+
+def _damage(path: Path) -> str | None:
+    header = _header(path)
+    if header is None:
+        return "not a scene file, or its header is damaged"
+    size, crc = header
+    actual = path.stat().st_size - _BLOCK
+    if actual < size:
+        return f"cut short ({actual} of {size} bytes)"
+    if actual != size or _measure(path) != header:
+        return f"changed since it was written (CRC-32 is not {crc:08x})"
+    return None
+
+
+def _header(path: Path) -> tuple[int, int] | None:
+    with path.open("rb") as raw:
+        match = _HEADER.fullmatch(raw.read(_BLOCK))
+    return (int(match[1]), int(match[2], 16)) if match else None
+
+
+def _measure(path: Path) -> tuple[int, int]:
+    size = crc = 0
+    with path.open("rb") as raw:
+        raw.seek(_BLOCK)
+        while chunk := raw.read(_CHUNK):
+            size += len(chunk)
+            crc = zlib.crc32(chunk, crc)
+    return size, crc

@@ -1,0 +1,79 @@
+"""Lets a path to an audio file stand as an option of the config group `sound`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from hydra.core.config_search_path import ConfigSearchPath
+from hydra.core.object_type import ObjectType
+from hydra.plugins.config_source import ConfigLoadError, ConfigResult, ConfigSource
+from hydra.plugins.search_path_plugin import SearchPathPlugin
+from omegaconf import OmegaConf
+
+AUDIO_SUFFIXES = (".wav", ".flac", ".ogg", ".oga", ".opus", ".mp3", ".aif", ".aiff", ".au", ".caf")
+_GROUP = "sound/"
+
+
+def is_audio(option: str) -> bool:
+    """Whether an option of the group `sound` is the path of an audio file."""
+    return option.lower().endswith(AUDIO_SUFFIXES)
+
+
+def quoted(value: str) -> str:
+    """Quote the audio paths of an override, so that blanks, commas and dots may stand in them."""
+    if Path(value).expanduser().is_file() and is_audio(value):
+        parts = [value]
+    elif value.startswith(("[", "'", '"')):
+        return value
+    else:
+        parts = value.split(",")
+    return ",".join(_quote(part) if is_audio(part) else part for part in parts)
+
+
+def _quote(path: str) -> str:
+    escaped = path.replace("'", "\\'")
+    return f"'{escaped}'"
+
+
+class AudioFiles(ConfigSource):
+    """A config source in which `sound/PATH.wav` holds the mapping {stem: PATH.wav}."""
+
+    @staticmethod
+    def scheme() -> str:
+        return "audio"
+
+    def load_config(self, config_path: str) -> ConfigResult:
+        if not self.is_config(config_path):
+            raise ConfigLoadError(f"Config not found: {config_path}")
+        path = config_path.removeprefix(_GROUP)
+        return ConfigResult(
+            provider=self.provider,
+            path=self.full_path(),
+            config=OmegaConf.create({Path(path).stem: path}),
+            header={"package": None},
+        )
+
+    def is_group(self, config_path: str) -> bool:
+        return False
+
+    def is_config(self, config_path: str) -> bool:
+        return config_path.startswith(_GROUP) and is_audio(config_path)
+
+    def available(self) -> bool:
+        return True
+
+    def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
+        return []
+
+
+class AudioFilesPath(SearchPathPlugin):
+    """Adds `AudioFiles` to the places where Hydra looks."""
+
+    def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
+        search_path.append("avn", "audio://")
+
+
+def as_mapping(node: Any) -> dict[str, str]:
+    """The node `sound` as a mapping of name to built-in recording or path."""
+    return {str(name): str(path) for name, path in node.items()}

@@ -1,0 +1,126 @@
+"""Stages: what is made once, under which name it lies, and who may make it.
+
+A stage's folder is named after a hash of everything its result depends on, so that equal
+configs share one result. A lock beside the folder keeps two processes from making the same
+thing at once; the second waits and finds it done.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+from omegaconf import DictConfig, ListConfig, OmegaConf
+
+from avn.errors import UserError
+
+
+def digest(*parts: Any) -> str:
+    """SHA-256, in hex, of plain values, configs and dataclasses; order of keys is of no account."""
+    return hashlib.sha256(canonical(parts).encode()).hexdigest()
+
+
+def canonical(value: Any) -> str:
+    """The one JSON text of a value, on which `digest` is computed."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, DictConfig | ListConfig):
+        return OmegaConf.to_container(value, resolve=True)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return dataclasses.asdict(value)
+    if isinstance(value, np.ndarray):
+        return [str(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
+    raise TypeError(f"cannot hash a {type(value).__name__}")
+
+
+def stage_folder(outputs: str | Path, stage: str, what: str, made_from: str) -> Path:
+    """`outputs/<stage>/<what>-<hash8>`."""
+    return Path(outputs) / stage / f"{what}-{made_from[:8]}"
+
+
+def make_once(
+    folder: Path,
+    what: str,
+    done: Callable[[], bool],
+    make: Callable[[], None],
+    auto: bool = True,
+    estimate: str = "",
+) -> None:
+    """Make what is missing in `folder`, unless it is there or another process makes it.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the result lies; the lock stands beside it.
+    what : str
+        What is made, for the line that says so.
+    done, make : callable
+        Whether it is there, and what makes it; `make` goes on where a killed one stopped.
+    auto : bool
+        With False a missing result is refused instead.
+    estimate : str
+        How long it takes, for the line that says so.
+
+    Raises
+    ------
+    UserError
+        Where it is missing and `auto` is False.
+    """
+    if done():
+        return
+    if not auto:
+        raise UserError(f"{folder}: {what} is missing and auto=false; leave auto=true to make it")
+    with locked(folder, what):
+        if done():
+            return
+        tell(f"{what} is missing: making it" + (f" ({estimate})" if estimate else ""))
+        started = time.perf_counter()
+        make()
+        tell(f"{what} made in {time.perf_counter() - started:.0f} s: {folder}")
+
+
+@contextmanager
+def locked(folder: Path, what: str) -> Iterator[None]:
+    """Hold the lock of a stage's folder; it is freed when the process ends, however it ends."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder.parent}: {error.strerror}; choose outputs=FOLDER") from error
+    lock = FileLock(folder.parent / f".{folder.name}.lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        tell(f"{what} is being made by another process: waiting for it")
+        lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside `path`, and rename it to `path` once the block has ended."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def tell(line: str) -> None:
+    """Print one line for the user, at once."""
+    print(line, flush=True)

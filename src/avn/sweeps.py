@@ -1,0 +1,106 @@
+"""Sweeps: each job leaves a record, and the end of the sweep sums them up.
+
+The records go through files, because a launcher may run its jobs in other processes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from hydra.core.hydra_config import HydraConfig
+from omegaconf import DictConfig
+
+from avn.stages import digest, tell, written_whole
+
+_RECORDS = "AVN_SWEEP_RECORDS"
+_KEYS = ["agent", "protocol", "acoustics", "look", "sound", "room"]
+_FIGURES = ["sr", "spl", "softspl", "sna", "dtg"]
+
+
+def begin() -> None:
+    """Open a place for the records of a sweep; the jobs' processes inherit it."""
+    os.environ[_RECORDS] = tempfile.mkdtemp(prefix="avn-sweep-")
+
+
+def run_job(
+    task: Callable[[DictConfig], Path | None],
+    cfg: DictConfig,
+    explain: Callable[[BaseException], str | None],
+) -> None:
+    """Run one job of a sweep and record how it ended, so that a failure stops no other job."""
+    job = HydraConfig.get().job
+    record: dict[str, Any] = {"overrides": job.override_dirname, "folder": None, "error": None}
+    try:
+        folder = task(cfg)
+        record["folder"] = str(folder) if folder else None
+    except Exception as error:
+        line = explain(error)
+        if line is None:
+            traceback.print_exc()
+        record["error"] = line or f"{type(error).__name__}: {error}"
+        record["code"] = 1 if line is None else 2
+        print(f"{record['overrides']}: {record['error']}", file=sys.stderr)
+    (Path(os.environ[_RECORDS]) / f"{job.num:06d}.json").write_text(json.dumps(record))
+
+
+def end(name: str) -> int:
+    """Print the mean and spread of a sweep and name the jobs that failed; give the exit code."""
+    records = [json.loads(p.read_text()) for p in sorted(Path(os.environ[_RECORDS]).iterdir())]
+    failed = [record for record in records if record["error"]]
+    folders = list(dict.fromkeys(record["folder"] for record in records if record["folder"]))
+    results = [Path(folder) / "results.csv" for folder in folders]
+    results = [path for path in results if path.is_file()]
+    if results:
+        summary = spread(pd.concat([pd.read_csv(path) for path in results]))
+        _print(summary)
+        # one folder a sweep, named by what it sums up
+        path = results[0].parents[2] / "sweeps" / digest(folders)[:8] / "results.csv"
+        with written_whole(path) as part:
+            summary.to_csv(part, index=False)
+        if not failed:
+            tell(str(path.parent))
+    for record in failed:
+        print(f"{name}: failed: {record['overrides']}: {record['error']}", file=sys.stderr)
+    if failed:
+        print(f"{name}: {len(failed)} of {len(records)} jobs failed", file=sys.stderr)
+    return max((record["code"] for record in failed), default=0)
+
+
+def spread(results: pd.DataFrame) -> pd.DataFrame:
+    """Mean and standard deviation over the seeds of a sweep's results.
+
+    Parameters
+    ----------
+    results : DataFrame
+        Rows of `results.csv` files.
+
+    Returns
+    -------
+    DataFrame
+        A row for each agent, protocol, acoustics, look, sound and room with `seeds` (their
+        count) and, for each figure, `<figure>_mean` and `<figure>_std` (sample standard
+        deviation; 0 for a single seed).
+    """
+    groups = results.groupby(_KEYS, sort=False)
+    table = groups["seed"].nunique().to_frame("seeds")
+    for figure in _FIGURES:
+        table[f"{figure}_mean"] = groups[figure].mean()
+        table[f"{figure}_std"] = groups[figure].std().fillna(0.0)
+    return table.reset_index()
+
+
+def _print(summary: pd.DataFrame) -> None:
+    for row in summary[summary["room"] == "average"].itertuples():
+        tell(
+            f"{row.agent} {row.sound} ({row.protocol}, {row.acoustics}), {row.seeds} seeds: "
+            f"SR {100 * row.sr_mean:.1f} +- {100 * row.sr_std:.1f} %, "
+            f"SPL {100 * row.spl_mean:.1f} +- {100 * row.spl_std:.1f} %"
+        )
