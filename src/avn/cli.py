@@ -20,7 +20,7 @@ import hydra
 import yaml
 from hydra.core.hydra_config import HydraConfig
 from hydra.core.plugins import Plugins
-from hydra.errors import HydraException
+from hydra.errors import HydraException, OverrideParseException
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -58,37 +58,47 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
     config.register()
     _register_plugins()
     name = f"avn.{config_name}"
-    sys.argv = [sys.argv[0], *arrange(sys.argv[1:])]
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises what it would print itself
-    state = {"composed": False}
+    errors: list[Exception] = []
 
     def job(cfg: DictConfig) -> None:
-        check_keys(cfg)
-        state["composed"] = True
         if HydraConfig.get().mode == RunMode.MULTIRUN:
-            sweeps.run_job(task, cfg, explain)
-        else:
-            task(cfg)
+            sweeps.run_job(checked, cfg, explain)
+            return
+        try:
+            checked(cfg)
+        except Exception as error:  # kept from Hydra, which would print lines of its own
+            errors.append(error)
+
+    def checked(cfg: DictConfig) -> Path | None:
+        check_keys(cfg)
+        return task(cfg)
 
     job.__module__ = name
-    is_sweep = "--multirun" in sys.argv
     try:
+        sys.argv = [sys.argv[0], *arrange(sys.argv[1:])]
+        is_sweep = "--multirun" in sys.argv
         if is_sweep:
             sweeps.begin()
         hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=config_name)(
             job
         )()
+        if errors:
+            return _report(name, errors[0], explain(errors[0]))
         return sweeps.end(name) if is_sweep else 0
     except KeyboardInterrupt:
         print(f"{name}: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
-        line = explain(error, composed=state["composed"])
-        if line is None:
-            traceback.print_exc()
-            return 1
-        print(f"{name}: {line}", file=sys.stderr)
-        return 2
+        return _report(name, error, explain(error, composed=False))
+
+
+def _report(name: str, error: Exception, line: str | None) -> int:
+    if line is None:
+        traceback.print_exception(error)
+        return 1
+    print(f"{name}: {line}", file=sys.stderr)
+    return 2
 
 
 def arrange(arguments: Iterable[str]) -> list[str]:
@@ -96,10 +106,18 @@ def arrange(arguments: Iterable[str]) -> list[str]:
 
     `-m` comes first wherever it stood, declared list keys get their brackets, and the paths
     of audio files their quotes.
+
+    Raises
+    ------
+    UserError
+        Where a group is given no option.
     """
     sweep, rest = [], []
+    groups = _groups()
     for argument in arguments:
         key, equals, value = argument.partition("=")
+        if key in groups and equals and value in ("", "null"):
+            raise UserError(f"{argument}: name an option, such as 'none'; there are {groups[key]}")
         if argument in ("-m", "--multirun"):
             sweep = ["--multirun"]
         elif equals and key in LIST_KEYS and not value.startswith("["):
@@ -109,6 +127,12 @@ def arrange(arguments: Iterable[str]) -> list[str]:
         else:
             rest.append(argument)
     return sweep + rest
+
+
+def _groups() -> dict[str, str]:
+    """The config groups and a list of their options."""
+    folders = [folder for folder in sorted(conf_folder().iterdir()) if folder.is_dir()]
+    return {f.name: ", ".join(sorted(file.stem for file in f.glob("*.yaml"))) for f in folders}
 
 
 def check_keys(cfg: DictConfig, path: str = "") -> None:
@@ -122,10 +146,10 @@ def check_keys(cfg: DictConfig, path: str = "") -> None:
     schema = OmegaConf.get_type(cfg)
     if dataclasses.is_dataclass(schema):
         known = [field.name for field in dataclasses.fields(schema)]
-        for key in cfg:
+        for key in map(str, cfg):
             if key not in known:
                 raise UserError(f"{path}{key}: no such key; there are {', '.join(known)}")
-    for key in cfg:
+    for key in map(str, cfg):
         if not OmegaConf.is_missing(cfg, key) and isinstance(node := cfg._get_node(key), DictConfig):
             if node._is_none():
                 continue
@@ -144,18 +168,20 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
     for link in chain:
         if isinstance(link, UserError):
             return _one_line(str(link))
+        if isinstance(link, OverrideParseException):
+            return f"{link.override}: cannot be read; put quotes round what Hydra reads as grammar"
     for link in chain:
         if isinstance(link, OSError) and link.filename and not isinstance(link, HydraException):
             return _one_line(f"{link.filename}: {link.strerror}")
     if not composed or isinstance(error, USER_MISTAKES):
-        texts = dict.fromkeys(_one_line(str(link)) for link in chain if str(link))
-        return "; ".join(texts)
+        first, *causes = dict.fromkeys(_one_line(str(link)) for link in chain if str(link))
+        return "; ".join([first, *(cause for cause in causes[:1] if cause not in first)])
     return None
 
 
 def _one_line(text: str) -> str:
     text = text.split("Config search path:")[0]
-    text = re.sub(r"\s+schema\b", "", text)  # the dataclasses stand among the options
+    text = re.sub(r"\s+\w*schema\b", "", text)  # the dataclasses stand among the options
     text = re.sub(r"\s*(full_key|object_type|reference_type)[:=]\s*\S*", "", text)
     return " ".join(text.split())
 

@@ -6,42 +6,111 @@ key or a wrong type is refused with its name.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from hydra.core.config_store import ConfigStore
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import MISSING, DictConfig, OmegaConf
 
 from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.clips import MicrophoneConfig
 from avn.agents.base import BaselineConfig
+from avn.agents.greedy import GreedyConfig
 from avn.apartments.splits import SplitConfig
 from avn.modules.sound_cnn import SoundModelConfig
 from avn.navigation.protocols import ProtocolConfig
 
-SCHEMAS = {
-    "split": SplitConfig,
-    "acoustics": AcousticsConfig,
-    "microphone": MicrophoneConfig,
-    "sound_model": SoundModelConfig,
-    "protocol": ProtocolConfig,
-    "baseline": BaselineConfig,
-}
 
-# Nodes without a dataclass, and the keys they may have.
-KEYS = {"agent": ("name",), "model": ("name",)}
+
+@dataclass
+class NameConfig:
+    """A node that only names something."""
+
+    name: str = MISSING
+
+
+@dataclass
+class CoreConfig:
+    """What every command has: the groups, and machine settings."""
+
+    split: SplitConfig = MISSING
+    acoustics: AcousticsConfig = MISSING
+    microphone: MicrophoneConfig = MISSING
+    sound: dict[str, str] = MISSING
+    sound_model: SoundModelConfig = MISSING
+    protocol: ProtocolConfig = MISSING
+    baseline: BaselineConfig = MISSING
+    takes: int = MISSING
+    outputs: str = MISSING
+    processes: int = MISSING
+    auto: bool = MISSING
+
+
+@dataclass
+class GenerateConfig(CoreConfig):
+    """Schema of `generate.yaml`."""
+
+    apartments: list[str] = MISSING
+    export: str | None = None
+    clips: list[list[int]] = MISSING
+
+
+@dataclass
+class TrainConfig(CoreConfig):
+    """Schema of `train.yaml`."""
+
+    model: NameConfig = MISSING
+
+
+@dataclass
+class EvalConfig(CoreConfig):
+    """Schema of `eval.yaml`."""
+
+    agent: NameConfig = MISSING
+    seed: int = MISSING
+    episodes: str = MISSING
+
+
+@dataclass
+class ReproduceConfig(CoreConfig):
+    """Schema of `reproduce.yaml`."""
+
+    rows: list[str] = MISSING
+    seeds: list[int] = MISSING
+
+
+COMMANDS = {
+    "generate": GenerateConfig,
+    "train": TrainConfig,
+    "eval": EvalConfig,
+    "reproduce": ReproduceConfig,
+}
+# The schema of each group that has one; `greedy_schema` is of an option with its own settings.
+SCHEMAS = {
+    ("split", "schema"): SplitConfig,
+    ("acoustics", "schema"): AcousticsConfig,
+    ("microphone", "schema"): MicrophoneConfig,
+    ("sound_model", "schema"): SoundModelConfig,
+    ("protocol", "schema"): ProtocolConfig,
+    ("baseline", "schema"): BaselineConfig,
+    ("baseline", "greedy_schema"): GreedyConfig,
+}
 
 
 def register() -> None:
-    """Store the schemas as `<group>/schema` and register the resolvers; may be called again."""
+    """Store the schemas and register the resolvers; may be called again."""
     store = ConfigStore.instance()
-    for group, schema in SCHEMAS.items():
-        store.store(group=group, name="schema", node=schema)
+    for (group, name), schema in SCHEMAS.items():
+        store.store(group=group, name=name, node=schema)
+    for command, schema in COMMANDS.items():
+        store.store(name=f"{command}_schema", node=schema)
     OmegaConf.register_new_resolver("run_dir", _run_dir, replace=True)
     OmegaConf.register_new_resolver("model_dir", _model_dir, replace=True)
 
 
 def _run_dir(*, _root_: DictConfig) -> str:
-    from avn import pipeline
+    from avn import evaluation
 
-    return pipeline.run_folder_name(_root_)
+    return evaluation.run_folder_name(_root_)
 
 
 def _model_dir(*, _root_: DictConfig) -> str:

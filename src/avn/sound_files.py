@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.object_type import ObjectType
@@ -73,7 +72,3 @@ class AudioFilesPath(SearchPathPlugin):
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
         search_path.append("avn", "audio://")
 
-
-def as_mapping(node: Any) -> dict[str, str]:
-    """The node `sound` as a mapping of name to built-in recording or path."""
-    return {str(name): str(path) for name, path in node.items()}

@@ -18,11 +18,10 @@ import pandas as pd
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
-from avn.stages import digest, tell, written_whole
+from avn.reporting.results import AVERAGE, across_seeds, write_csv
+from avn.stages import digest, tell
 
 _RECORDS = "AVN_SWEEP_RECORDS"
-_KEYS = ["agent", "protocol", "acoustics", "look", "sound", "room"]
-_FIGURES = ["sr", "spl", "softspl", "sna", "dtg"]
 
 
 def begin() -> None:
@@ -59,12 +58,11 @@ def end(name: str) -> int:
     results = [Path(folder) / "results.csv" for folder in folders]
     results = [path for path in results if path.is_file()]
     if results:
-        summary = spread(pd.concat([pd.read_csv(path) for path in results]))
+        summary = across_seeds(pd.concat([pd.read_csv(path) for path in results]))
         _print(summary)
         # one folder a sweep, named by what it sums up
         path = results[0].parents[2] / "sweeps" / digest(folders)[:8] / "results.csv"
-        with written_whole(path) as part:
-            summary.to_csv(part, index=False)
+        write_csv(summary, path)
         if not failed:
             tell(str(path.parent))
     for record in failed:
@@ -74,33 +72,11 @@ def end(name: str) -> int:
     return max((record["code"] for record in failed), default=0)
 
 
-def spread(results: pd.DataFrame) -> pd.DataFrame:
-    """Mean and standard deviation over the seeds of a sweep's results.
-
-    Parameters
-    ----------
-    results : DataFrame
-        Rows of `results.csv` files.
-
-    Returns
-    -------
-    DataFrame
-        A row for each agent, protocol, acoustics, look, sound and room with `seeds` (their
-        count) and, for each figure, `<figure>_mean` and `<figure>_std` (sample standard
-        deviation; 0 for a single seed).
-    """
-    groups = results.groupby(_KEYS, sort=False)
-    table = groups["seed"].nunique().to_frame("seeds")
-    for figure in _FIGURES:
-        table[f"{figure}_mean"] = groups[figure].mean()
-        table[f"{figure}_std"] = groups[figure].std().fillna(0.0)
-    return table.reset_index()
-
-
 def _print(summary: pd.DataFrame) -> None:
-    for row in summary[summary["room"] == "average"].itertuples():
-        tell(
-            f"{row.agent} {row.sound} ({row.protocol}, {row.acoustics}), {row.seeds} seeds: "
-            f"SR {100 * row.sr_mean:.1f} +- {100 * row.sr_std:.1f} %, "
-            f"SPL {100 * row.spl_mean:.1f} +- {100 * row.spl_std:.1f} %"
+    for row in summary[summary["room"] == AVERAGE].to_dict("records"):
+        figures = ", ".join(
+            f"{figure.upper()} {100 * row[figure]:.1f} +- {100 * row[figure + '_std']:.1f} %"
+            for figure in ("sr", "spl")
         )
+        labels = f"{row['agent']}, {row['sound']} ({row['protocol']}, {row['acoustics']})"
+        tell(f"{labels}, {row['seeds']} seeds: {figures}")

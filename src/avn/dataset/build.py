@@ -11,6 +11,7 @@ import shutil
 from collections.abc import Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ import numpy as np
 
 from avn.acoustics import brir
 from avn.acoustics.brir import AcousticsConfig
+from avn.acoustics.first_arrival import FirstArrivals
+from avn.acoustics.materials import NAMES, absorption, scattering
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid, source_cells
 from avn.apartments.sight import line_of_sight
@@ -43,7 +46,13 @@ def geometry_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
 def tail_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
     """Hash of what the traced reverberation is made from; the regime is no part of it."""
     settings = {key: value for key, value in asdict(acoustics).items() if key not in _REGIME}
-    return digest(plan.to_dict(), settings, brir.assets_hash(), MAKING["tail"])
+    return digest(plan.to_dict(), settings, _assets_hash(acoustics.rate), MAKING["tail"])
+
+
+@cache
+def _assets_hash(rate: int) -> str:
+    """Hash of the heads and of the materials, which the responses depend on too."""
+    return digest(brir.head_filters(rate), absorption(NAMES), scattering(NAMES), NAMES)
 
 
 def first_arrival_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
@@ -113,7 +122,7 @@ def _render_tail(job: _Job) -> int:
     return len(job.cells)
 
 
-def _render_first_arrivals(job: _Job) -> brir.FirstArrivals:
+def _render_first_arrivals(job: _Job) -> FirstArrivals:
     source = np.array([*job.source, job.acoustics.source_height])
     ears = _points(job.cells, job.acoustics.ear_height)
     return brir.render_first_arrivals(walls(job.plan), source, ears, job.acoustics)

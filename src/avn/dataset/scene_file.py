@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import zlib
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -67,18 +68,14 @@ def open_checked(path: Path, kind: str, version: int, made_from: str | None = No
     """
     if not path.is_file():
         raise UserError(f"{path}: no such scene file; run `python -m avn.generate` to make it")
-    file = None
     try:
-        file = h5py.File(path, "r")
-        _check(dict(file.attrs), path, kind, version, made_from)
-    except UserError:
-        file.close()
-        raise
+        with ExitStack() as opened:
+            file = opened.enter_context(h5py.File(path, "r"))
+            _check(dict(file.attrs), path, kind, version, made_from)
+            opened.pop_all()  # it is whole: the caller closes it
+            return file
     except (OSError, KeyError, RuntimeError, ValueError) as error:  # what h5py makes of damage
-        if file is not None:
-            file.close()
         raise UserError(f"{path}: {_damage(path) or 'not an HDF5 file'}; {_MEND}") from error
-    return file
 
 
 def _check(

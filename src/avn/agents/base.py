@@ -1,0 +1,72 @@
+"""What an agent is: it moves N episodes at once, and knows what it observes and no more."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import torch
+from tensordict import TensorDict
+from torch import Tensor
+
+from avn.navigation.protocols import Protocol
+
+if TYPE_CHECKING:
+    from avn.navigation.simulator import Simulator
+
+
+@dataclass
+class BaselineConfig:
+    """Schema of the config node `baseline`; a null target is no baseline."""
+
+    _target_: str | None = None
+
+
+class Agent(ABC):
+    """An agent that acts in N episodes at once.
+
+    Attributes
+    ----------
+    privileged : bool
+        Whether the agent is shown the simulator before it acts; such rows are bounds and no
+        entries of the table.
+    needs : tuple of str
+        Observations without which it cannot act.
+    """
+
+    privileged: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
+        """Begin N new episodes.
+
+        Parameters
+        ----------
+        n : int
+        generator : torch.Generator
+            Where all that the agent draws comes from.
+        protocol : Protocol
+            The rules: which actions there are, and when to say Stop.
+        """
+        self.n = n
+        self.generator = generator
+        self.protocol = protocol
+
+    @abstractmethod
+    def act(self, observation: TensorDict) -> Tensor:
+        """Choose an action for every episode, finished ones included.
+
+        Parameters
+        ----------
+        observation : TensorDict
+            See `Simulator.observe`.
+
+        Returns
+        -------
+        (N,) int64
+        """
+
+    def reveal(self, simulator: Simulator) -> None:
+        """Show the truth to a privileged agent, after `reset` and before it acts."""
+        raise PermissionError(f"{type(self).__name__} is not privileged and may not see the truth")

@@ -1,0 +1,25 @@
+"""`python -m avn.eval agent=greedy sound=alarm`: lets an agent walk and prints its row."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from omegaconf import DictConfig
+
+from avn import evaluation
+from avn.cli import command
+from avn.stages import tell
+
+
+@command("eval")
+def main(cfg: DictConfig) -> Path:
+    """Evaluate one row, or open its finished run, and print the table."""
+    folder = evaluation.evaluate(cfg)
+    evaluation.show(folder)
+    tell(str(folder))
+    return folder
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,114 @@
+"""One run: an agent walks all episodes of the test apartments and leaves its records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+from torch.utils.tensorboard import SummaryWriter
+
+from avn import pipeline
+from avn.acoustics.dry_sounds import content_hash
+from avn.agents.base import Agent
+from avn.dataset import build
+from avn.dataset.scene import Scene
+from avn.errors import UserError
+from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
+from avn.navigation.protocols import Protocol
+from avn.navigation.run import Labels, walk_room
+from avn.reporting import results, table
+from avn.stages import digest, make_once
+
+# Raised when the code of simulator, agents or metrics changes a record.
+VERSION = 1
+RESULTS, EPISODE_RECORDS = "results.csv", "episodes.csv"
+EPISODES = {"frozen": frozen_episodes, "exhaustive": exhaustive_episodes}
+
+
+def run_hash(cfg: DictConfig) -> str:
+    """Hash of what a run's records depend on."""
+    acoustics = pipeline.typed(cfg.acoustics)
+    apartments = [build.first_arrival_hash(p, acoustics) for p in pipeline.plans(cfg)["test"]]
+    ears = pipeline.model_hash(cfg) if pipeline.hears(cfg) else None
+    rules = (cfg.protocol, cfg.baseline, cfg.agent, cfg.seed, cfg.episodes, cfg.takes)
+    sounds = content_hash(pipeline.sound_files(cfg))
+    return digest(apartments, ears, rules, sounds, VERSION)
+
+
+def run_folder_name(cfg: DictConfig) -> str:
+    """`<agent>/<sounds>/seed<seed>-<hash8>`: the folder of a run under `outputs/eval`."""
+    sounds = "-".join(pipeline.sound_files(cfg))
+    return f"{cfg.agent.name}/{sounds}/seed{cfg.seed}-{run_hash(cfg)[:8]}"
+
+
+def evaluate(cfg: DictConfig) -> Path:
+    """Walk, unless the run is there, and write `episodes.csv`, `results.csv` and TensorBoard.
+
+    Returns
+    -------
+    Path
+        The run's folder.
+
+    Raises
+    ------
+    UserError
+        Where an option cannot work, or something it needs is missing and `auto` is false.
+    """
+    if cfg.episodes not in EPISODES:
+        raise UserError(f"episodes: '{cfg.episodes}' is none of {', '.join(EPISODES)}")
+    protocol: Protocol = instantiate(cfg.protocol)
+    agent: Agent | None = instantiate(cfg.baseline) if cfg.baseline._target_ else None
+    if agent is None:
+        raise UserError("baseline: 'none' cannot act; choose random_walk, greedy or oracle")
+    folder = Path(cfg.outputs) / "eval" / run_folder_name(cfg)
+    make_once(
+        folder,
+        f"run of '{cfg.agent.name}' with seed {cfg.seed}",
+        done=(folder / RESULTS).is_file,
+        make=lambda: _walk(cfg, agent, protocol, folder),
+    )
+    return folder
+
+
+def _walk(cfg: DictConfig, agent: Agent, protocol: Protocol, folder: Path) -> None:
+    rooms = pipeline.scenes(cfg, ("test",))["test"]
+    hearing: list[Any] = [None] * len(rooms)
+    if pipeline.hears(cfg):
+        pipeline.scenes(cfg, ("test",), audible=True)
+        hearing = pipeline.hearing(cfg, rooms)
+    labels = Labels(agent=cfg.agent.name, acoustics=cfg.acoustics.name)
+    walked = [
+        walk_room(agent, room, episodes_of(cfg, room, protocol), protocol, labels, heard)
+        for room, heard in zip(rooms, hearing, strict=True)
+    ]
+    episodes = pd.concat(walked, ignore_index=True)
+    summary = results.summarise(episodes)
+    _log(cfg, folder, summary)
+    results.write_csv(episodes, folder / EPISODE_RECORDS)
+    results.write_csv(summary, folder / RESULTS)
+
+
+def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
+    """The episodes of a room as the config asks for them."""
+    return EPISODES[cfg.episodes](room, list(pipeline.sound_files(cfg)), protocol, cfg.seed)
+
+
+def show(folder: Path) -> None:
+    """Print the table of a run's folder by room and sound, and how hard its episodes are."""
+    table.print_tables(pd.read_csv(folder / RESULTS), pd.read_csv(folder / EPISODE_RECORDS))
+
+
+def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
+    """TensorBoard's scalars by room and sound, and hparams with SR and SPL to compare runs by."""
+    settings = {key: cfg[key].name for key in ("agent", "protocol", "acoustics", "split")}
+    settings |= {"seed": cfg.seed, "episodes": cfg.episodes}
+    settings["sounds"] = "-".join(pipeline.sound_files(cfg))
+    figures = results.headline(summary)
+    with SummaryWriter(str(folder)) as writer:
+        for row in summary.itertuples():
+            for name in figures:
+                writer.add_scalar(f"{name}/{row.sound}/{row.room}", getattr(row, name), cfg.seed)
+        writer.add_hparams(settings, figures, run_name=".")

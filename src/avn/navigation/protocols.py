@@ -1,0 +1,105 @@
+"""Protocols: when an episode ends, what succeeds, and what a path is measured in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from omegaconf import MISSING
+
+from avn.apartments.floor_plan import CELL
+from avn.apartments.grid import Grid
+from avn.errors import UserError
+from avn.navigation.actions import STOP
+
+GOALS = ("box", "radius")
+PATHS = ("attempted", "walked")
+
+
+@dataclass
+class ProtocolConfig:
+    """Schema of the config node `protocol`; the fields mean what `Protocol` says."""
+
+    _target_: str = "avn.navigation.protocols.Protocol"
+    name: str = MISSING
+    goal: str = MISSING
+    radius: float = 1.0
+    says_stop: bool = MISSING
+    path: str = MISSING
+    moves_factor: float | None = None
+    max_actions: int = 500
+    starts: int = 20
+    exploration: int = 400
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """The rules of an episode.
+
+    Attributes
+    ----------
+    name : str
+    goal : {"box", "radius"}
+        Where an agent succeeds: in the 3 x 3 cells around the source that are at most 2 moves
+        away from it (so that a cell behind a wall does not count), or within `radius` metres of
+        the source along the shortest walk.
+    radius : float
+        Metres, for goal "radius".
+    says_stop : bool
+        Whether Stop is an action. If so, it ends the episode, and only Stop at the goal succeeds;
+        if not, arriving there does.
+    path : {"attempted", "walked"}
+        What SPL measures. "attempted": p is attempted moves, blocked ones too, and l the moves of
+        the shortest walk to the nearest goal cell. "walked": p is metres walked and l the metres
+        of the shortest walk to the source itself. Rotations count in neither.
+    moves_factor : float or None
+        The episode ends when attempted moves reach this many times the shortest moves to the
+        source cell; None for no such cap.
+    max_actions : int
+        The episode ends after so many actions of any kind.
+    starts : int
+        Episodes of a frozen list for each source and sound.
+    exploration : int
+        Steps of the exploration walk, whose cells are no starts; 0 for no walk.
+    """
+
+    name: str
+    goal: str
+    says_stop: bool
+    path: str
+    radius: float = 1.0
+    moves_factor: float | None = None
+    max_actions: int = 500
+    starts: int = 20
+    exploration: int = 400
+
+    def __post_init__(self) -> None:
+        for key, value, known in (("goal", self.goal, GOALS), ("path", self.path, PATHS)):
+            if value not in known:
+                raise UserError(f"protocol.{key}: '{value}' is none of {', '.join(known)}")
+        for key, least in (("max_actions", 1), ("starts", 1), ("exploration", 0)):
+            if getattr(self, key) < least:
+                raise UserError(f"protocol.{key}: {getattr(self, key)} is less than {least}")
+        if self.radius < 0:
+            raise UserError(f"protocol.radius: {self.radius} is negative; give metres")
+        if self.moves_factor is not None and self.moves_factor < 1:
+            raise UserError(
+                f"protocol.moves_factor: {self.moves_factor} is less than 1, so that no walk could "
+                "arrive; give at least 1, or null for no cap"
+            )
+
+    @property
+    def actions(self) -> int:
+        """How many actions there are: 5 with Stop, 4 without; they are numbered from 0."""
+        return STOP + 1 if self.says_stop else STOP
+
+    def goal_cells(self, grid: Grid, sources: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Where an agent succeeds, (K, C)."""
+        moves = grid.distances[sources].astype(np.int64)
+        if self.goal == "radius":
+            # A cell that is exactly 1 m away is within 1 m, whatever the rounding.
+            return moves * CELL <= self.radius + 1e-9
+        offset = np.abs(grid.lattice[None, :, :] - grid.lattice[sources][:, None, :])
+        near: NDArray[np.bool_] = (offset.max(axis=-1) <= 1) & (moves <= 2)
+        return near

@@ -1,0 +1,242 @@
+"""The stages in their order: scenes, the sound network, what it hears.
+
+Each function makes sure that what a config asks for is there, makes it where it is missing, and
+opens it. A result's folder is named by the hash of what it depends on (docs/architecture.md).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import torch
+from hydra.utils import instantiate
+from omegaconf import DictConfig, OmegaConf
+from torch import Tensor
+
+from avn.acoustics.brir import AcousticsConfig
+from avn.acoustics.clips import DrySounds, MicrophoneConfig
+from avn.acoustics.dry_sounds import BUILTIN, content_hash, load_sounds
+from avn.apartments.floor_plan import FloorPlan
+from avn.apartments.splits import SplitConfig, load_split
+from avn.dataset import build, scene_file
+from avn.dataset.scene import Scene
+from avn.datamodules.sound import SoundData
+from avn.errors import UserError
+from avn.modules import sound_training
+from avn.modules.hearing import hear
+from avn.modules.sound_cnn import SoundCnn
+from avn.stages import digest, make_once, stage_folder, written_whole
+
+# Raised when the code of a stage changes its result.
+VERSIONS = {"sound_cnn": 1, "hear": 1}
+# What networks are trained on, whatever `sound=` says.
+TRAINING_SOUNDS = {name: name for name in BUILTIN}
+METRICS = "metrics.json"
+# Draws the takes of what is heard; an episode draws among them from its own seed.
+HEARING_SEED = 0
+PARTS = ("train", "validation", "test")
+
+
+def typed(node: DictConfig) -> Any:
+    """The dataclass instance that a config node of a schema stands for."""
+    return OmegaConf.to_object(node)
+
+
+def plans(cfg: DictConfig) -> dict[str, list[FloorPlan]]:
+    """Floor plans of the split, by part: train, validation, test."""
+    return _plans(OmegaConf.to_yaml(cfg.split, resolve=True), typed(cfg.split))
+
+
+_PLANS: dict[str, dict[str, list[FloorPlan]]] = {}
+
+
+def _plans(key: str, split: SplitConfig) -> dict[str, list[FloorPlan]]:
+    # the folders' names and the stages ask for the same plans several times in one command
+    if key not in _PLANS:
+        _PLANS[key] = load_split(split)
+    return _PLANS[key]
+
+
+def scenes_folder(cfg: DictConfig) -> Path:
+    """The folder that holds the scene folders of the split."""
+    acoustics: AcousticsConfig = typed(cfg.acoustics)
+    hashes = [build.tail_hash(plan, acoustics) for part in plans(cfg).values() for plan in part]
+    return stage_folder(cfg.outputs, "generate", cfg.split.name, digest(hashes))
+
+
+def scenes(
+    cfg: DictConfig, parts: Sequence[str] = PARTS, audible: bool = False
+) -> dict[str, list[Scene]]:
+    """The scenes of some parts of the split, made where they are missing.
+
+    Parameters
+    ----------
+    parts : sequence of {"train", "validation", "test"}
+    audible : bool
+        Whether their impulse responses must be there too, in the regime of `acoustics`.
+
+    Raises
+    ------
+    UserError
+        Where a part has no apartment, or something is missing and `auto` is false.
+    """
+    chosen = {part: plans(cfg)[part] for part in parts}
+    for part, found in chosen.items():
+        if not found:
+            raise UserError(f"split.{part}: split '{cfg.split.name}' has no {part} apartment")
+    acoustics: AcousticsConfig = typed(cfg.acoustics)
+    folder = scenes_folder(cfg)
+    opened = {
+        part: [build.build_geometry(plan, acoustics, folder / plan.name) for plan in found]
+        for part, found in chosen.items()
+    }
+    if audible:
+        every = [which for found in opened.values() for which in found]
+        pairs = sum(len(which.sources) * which.grid.cells for which in every)
+        make_once(
+            folder,
+            f"sound of the {', '.join(parts)} apartments of '{cfg.split.name}' ({acoustics.name})",
+            done=lambda: build.acoustics_made(every, acoustics),
+            make=lambda: build.build_acoustics(every, acoustics, cfg.processes),
+            auto=cfg.auto,
+            estimate=f"about {max(1, round(pairs * 0.02 / cfg.processes))} s",
+        )
+    return opened
+
+
+def hears(cfg: DictConfig) -> bool:
+    """Whether the config has a sound model."""
+    return bool(cfg.sound_model.name != "none")
+
+
+def sound_files(cfg: DictConfig) -> dict[str, str]:
+    """The node `sound`: name to built-in recording or path."""
+    return {str(name): str(path) for name, path in cfg.sound.items()}
+
+
+def model_hash(cfg: DictConfig) -> str:
+    """Hash of what the sound network's weights depend on."""
+    acoustics: AcousticsConfig = typed(cfg.acoustics)
+    apartments = {
+        part: [build.first_arrival_hash(plan, acoustics) for plan in plans(cfg)[part]]
+        for part in ("train", "validation")
+    }
+    sounds = content_hash(TRAINING_SOUNDS)
+    return digest(apartments, sounds, cfg.microphone, cfg.sound_model, VERSIONS["sound_cnn"])
+
+
+def model_folder_name(cfg: DictConfig) -> str:
+    """`sound_cnn-<hash8>`: the folder of the network under `outputs/train`."""
+    return f"sound_cnn-{model_hash(cfg)[:8]}"
+
+
+def sound_model(cfg: DictConfig) -> tuple[SoundCnn, Path]:
+    """The trained sound network and its folder; trains it where it is missing.
+
+    Raises
+    ------
+    UserError
+        Where the config has no sound model, or a checkpoint belongs to another config.
+    """
+    if not hears(cfg):
+        raise UserError("sound_model: 'none' cannot hear; choose cnn5 or released")
+    torch.manual_seed(cfg.sound_model.train_seed)
+    model: SoundCnn = instantiate(cfg.sound_model)
+    folder = stage_folder(cfg.outputs, "train", "sound_cnn", model_hash(cfg))
+    make_once(
+        folder,
+        f"sound network '{cfg.sound_model.name}' ({cfg.acoustics.name})",
+        done=(folder / METRICS).is_file,
+        make=lambda: _fit(cfg, model, folder),
+        auto=cfg.auto,
+        estimate="a few minutes",
+    )
+    return sound_training.load_weights(model, folder / sound_training.BEST), folder
+
+
+def _fit(cfg: DictConfig, model: SoundCnn, folder: Path) -> None:
+    opened = scenes(cfg, ("train", "validation"), audible=True)
+    data = SoundData(
+        opened["train"],
+        opened["validation"],
+        cfg.acoustics.name,
+        DrySounds(load_sounds(TRAINING_SOUNDS)),
+        typed(cfg.microphone),
+        typed(cfg.sound_model),
+    )
+    metrics = sound_training.fit(data, model, folder)
+    with written_whole(folder / METRICS) as part:
+        part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+
+
+@dataclass(frozen=True)
+class _Ears:
+    """Everything that what is heard in a scene depends on."""
+
+    model: SoundCnn
+    sounds: dict[str, str]
+    regime: str
+    microphone: MicrophoneConfig
+    takes: int
+
+
+def hearing(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
+    """What the sound network makes of every clip of each scene, made where it is missing.
+
+    Returns
+    -------
+    list of (K, S, sounds, takes, 2) float32
+        Metres to the right and to the front.
+    """
+    model, folder = sound_model(cfg)
+    sounds = sound_files(cfg)
+    ears = _Ears(model, sounds, cfg.acoustics.name, typed(cfg.microphone), cfg.takes)
+    acoustics: AcousticsConfig = typed(cfg.acoustics)
+    made_from = digest(folder.name, content_hash(sounds), cfg.takes, VERSIONS["hear"])
+    target = stage_folder(cfg.outputs, "hear", "-".join(sounds), made_from)
+    clips = sum(4 * s.grid.cells * len(s.sources) for s in chosen) * len(sounds) * cfg.takes
+    paths = [target / f"{which.name}.h5" for which in chosen]
+    hashes = [digest(made_from, build.first_arrival_hash(s.plan, acoustics)) for s in chosen]
+
+    def make() -> None:
+        for which, path, own in zip(chosen, paths, hashes, strict=True):
+            if not path.is_file():
+                _write_hearing(which, path, own, ears)
+
+    make_once(
+        target,
+        f"what '{cfg.sound_model.name}' hears in {', '.join(s.name for s in chosen)}",
+        done=lambda: all(path.is_file() for path in paths),
+        make=make,
+        auto=cfg.auto,
+        estimate=f"about {max(1, clips // 800)} s",
+    )
+    return [_read_hearing(path, own) for path, own in zip(paths, hashes, strict=True)]
+
+
+def _write_hearing(which: Scene, path: Path, made_from: str, ears: _Ears) -> None:
+    sounds = DrySounds(load_sounds(ears.sounds))
+    heard = hear(
+        which,
+        ears.regime,
+        sounds,
+        ears.model,
+        ears.takes,
+        ears.microphone,
+        seed=HEARING_SEED,
+    )
+
+    def fill(file: h5py.File) -> None:
+        file["estimates"] = heard.numpy()
+
+    scene_file.write(path, "hearing", VERSIONS["hear"], made_from, fill)
+
+
+def _read_hearing(path: Path, made_from: str) -> Tensor:
+    with scene_file.open_checked(path, "hearing", VERSIONS["hear"], made_from) as file:
+        return torch.from_numpy(file["estimates"][()])

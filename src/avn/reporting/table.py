@@ -1,0 +1,135 @@
+"""The tables that people read: results by room and sound as the paper lays them out."""
+
+from __future__ import annotations
+
+from importlib import resources
+
+import numpy as np
+import pandas as pd
+from rich.console import Console
+from rich.table import Table
+
+from avn.reporting.results import ALL_SOUNDS, AVERAGE
+
+PAPER = "Gan et al. 2020"
+PAPER_PROTOCOL = "var"
+
+
+def paper_table() -> pd.DataFrame:
+    """The paper's own table in long form: agent, sound, room, sr, spl, both in %.
+
+    From Gan, Zhang, Wu, Gong and Tenenbaum, "Look, Listen, and Act: Towards Audio-Visual Embodied
+    Navigation", ICRA 2020, table I. Its rooms are other apartments than ours of the same size.
+    """
+    file = resources.files("avn") / "assets" / "paper_table.csv"
+    with file.open(encoding="utf-8") as lines:
+        return pd.read_csv(lines)
+
+
+def results_table(results: pd.DataFrame) -> Table:
+    """Success rate / SPL in %, a row for each agent and sound and a column for each room.
+
+    Under each row stands the paper's own where it has one, which is under its own protocol `var`
+    alone; its `all` is the mean over its sounds.
+    Figures of several seeds are averaged.
+    """
+    rooms = list(dict.fromkeys(results["room"]))
+    table = Table(title="success rate / SPL, %", box=None, pad_edge=False, title_justify="left")
+    table.add_column("", no_wrap=True)
+    for room in rooms:
+        table.add_column(_readable(room), justify="right", no_wrap=True)
+    paper = _paper_cells()
+    columns = ["agent", "protocol", "acoustics", "look"]
+    for keys, run in results.groupby(columns, sort=False):
+        names = [str(key) for key in keys]
+        table.add_row(f"[bold]{' · '.join(names)}[/bold]")
+        for sound, part in run.groupby("sound", sort=False):
+            means = 100.0 * part.groupby("room", sort=False)[["sr", "spl"]].mean()
+            cells = [_cell(*row) for row in means.reindex(rooms).to_numpy()]
+            table.add_row(f"  {sound}", *cells)
+            own = [paper.get((*names[:2], str(sound), room), "") for room in rooms]
+            if any(own):
+                table.add_row(f"    {PAPER}", *own, style="dim")
+    return table
+
+
+def hardness(episodes: pd.DataFrame) -> pd.DataFrame:
+    """How hard the starts are, by room and on average.
+
+    Returns
+    -------
+    DataFrame
+        `room`; `episodes`; `other_room`, the share of starts in another room than the source;
+        `out_of_sight`, the share of starts that do not see it; `detour`, the mean ratio of
+        geodesic to Euclidean distance; `geodesic`, the mean in metres.
+    """
+    described = pd.DataFrame(
+        {
+            "room": episodes["room"],
+            "other_room": (episodes["rooms_crossed"] > 0).astype(float),
+            "out_of_sight": 1.0 - episodes["in_sight"].astype(float),
+            "detour": episodes["geodesic"] / episodes["euclidean"],
+            "geodesic": episodes["geodesic"],
+        }
+    )
+    groups = described.groupby("room", sort=False)
+    table = groups.mean()
+    table.insert(0, "episodes", groups.size())
+    average = table.mean()
+    average["episodes"] = len(episodes)
+    table.loc[AVERAGE] = average
+    return table.reset_index().astype({"episodes": np.int64})
+
+
+def hardness_table(episodes: pd.DataFrame) -> Table:
+    """`hardness` as a table for the terminal."""
+    table = Table(title="how hard the starts are", box=None, pad_edge=False, title_justify="left")
+    table.add_column("", no_wrap=True)
+    for title in ("starts", "in another room", "out of sight", "geodesic / Euclidean", "geodesic"):
+        table.add_column(title, justify="right", no_wrap=True)
+    described = hardness(episodes).set_index("room")
+    shares = described[["other_room", "out_of_sight", "detour", "geodesic"]].to_numpy(np.float64)
+    for room, count, row in zip(described.index, described["episodes"], shares, strict=True):
+        other, hidden, detour, geodesic = row
+        cells = (f"{100 * other:.0f} %", f"{100 * hidden:.0f} %", f"{detour:.2f}")
+        table.add_row(_readable(str(room)), str(count), *cells, f"{geodesic:.1f} m")
+    return table
+
+
+def print_tables(
+    results: pd.DataFrame, episodes: pd.DataFrame, console: Console | None = None
+) -> None:
+    """Print the results and how hard the starts are."""
+    console = console or _console()
+    for table in (results_table(results), hardness_table(episodes)):
+        console.print(table)
+        console.print()
+
+
+def _console() -> Console:
+    """A console that does not cut the table off where the output is a file or a pipe."""
+    console = Console()
+    return console if console.is_terminal else Console(width=120)
+
+
+def _paper_cells() -> dict[tuple[str, ...], str]:
+    """The paper's cells by agent, protocol, sound and room."""
+    table = paper_table()
+    means = table.groupby(["agent", "room"], as_index=False)[["sr", "spl"]].mean()
+    table = pd.concat([table, means.assign(sound=ALL_SOUNDS)])
+    keys = zip(table["agent"], table["sound"], table["room"], strict=True)
+    figures = table[["sr", "spl"]].to_numpy()
+    return {
+        (agent, PAPER_PROTOCOL, sound, room): _cell(*row)
+        for (agent, sound, room), row in zip(keys, figures, strict=True)
+    }
+
+
+def _cell(sr: float, spl: float) -> str:
+    if np.isnan(sr):
+        return ""
+    return "/".join("100" if value >= 99.95 else f"{value:.1f}" for value in (sr, spl))
+
+
+def _readable(room: str) -> str:
+    return room.replace("_", " ").capitalize()

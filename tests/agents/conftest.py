@@ -1,0 +1,38 @@
+"""A hand-drawn apartment and the three protocols."""
+
+import pytest
+
+from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.protocols import Protocol
+
+THREE_ROOMS = """
+aaaaa#bbbbbbb
+aAaaa#bbbbb#b
+aaaaaaabbbb#b
+aa#aa#bbbbB#b
+aa#aa#bbbb##b
+###a####b####
+cccccc#cccccc
+ccCccccccccCc
+cccc##ccccccc
+"""
+
+
+@pytest.fixture
+def flat() -> DrawnPlace:
+    return draw("flat", THREE_ROOMS)
+
+
+@pytest.fixture
+def hall() -> DrawnPlace:
+    """One empty room, so that nothing is in the way."""
+    return draw("hall", "\n".join(["a" * 15] * 7 + ["a" * 7 + "A" + "a" * 7] + ["a" * 15] * 7))
+
+
+@pytest.fixture(params=["var", "var_stop", "stop"])
+def protocol(request: pytest.FixtureRequest) -> Protocol:
+    return {
+        "var": Protocol("var", "box", False, "attempted", moves_factor=2.0),
+        "var_stop": Protocol("var_stop", "box", True, "attempted", moves_factor=2.0),
+        "stop": Protocol("stop", "radius", True, "walked"),
+    }[request.param]

@@ -1,0 +1,111 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from avn.errors import UserError
+from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
+from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.protocols import Protocol
+
+HALL = "\n".join(["a" * 30] * 14 + ["A" + "a" * 28 + "A"])
+SOUNDS = ("ring", "alarm", "clock")
+FROZEN = [180, 188, 17, 80, 187, 102, 71, 201, 202, 195, 29, 14]
+
+
+def test_frozen_list_stays_frozen(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    # These very numbers are what published figures rest on: a change here changes every result.
+    rules = dataclasses.replace(protocols["var"], starts=6)
+    episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
+    assert episodes.start.tolist() == FROZEN
+
+
+def test_same_starts_for_all_sounds(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    episodes = frozen_episodes(two_rooms, SOUNDS, protocols["var"], seed=3)
+    assert len(episodes) == 3 * 2 * 20
+    by_sound = [episodes.sound == index for index in range(3)]
+    for field in (episodes.start, episodes.source, episodes.number):
+        assert (field[by_sound[0]] == field[by_sound[1]]).all()
+        assert (field[by_sound[0]] == field[by_sound[2]]).all()
+    alone = frozen_episodes(two_rooms, ["clock"], protocols["var"], seed=3)
+    assert (alone.start == episodes.start[by_sound[2]]).all()
+
+
+def test_seed_and_room_change_the_starts(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    first, again, other = (
+        frozen_episodes(two_rooms, ["ring"], protocols["var"], seed).start for seed in (0, 0, 1)
+    )
+    elsewhere = dataclasses.replace(two_rooms, name="elsewhere")
+    assert (first == again).all()
+    assert (first != other).any()
+    assert (first != frozen_episodes(elsewhere, ["ring"], protocols["var"], 0).start).any()
+
+
+@pytest.mark.parametrize("name", ["var", "var_stop", "stop"])
+def test_starts_lie_outside_the_goal_and_differ(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol], name: str
+) -> None:
+    rules = protocols[name]
+    episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
+    goal = rules.goal_cells(two_rooms.grid, two_rooms.sources)
+    assert not goal[episodes.source, episodes.start // 4].any()
+    assert len(set(zip(episodes.source.tolist(), episodes.start.tolist(), strict=True))) == 40
+    assert set((episodes.start % 4).tolist()) == {0, 1, 2, 3}
+
+
+def test_starts_lie_outside_the_exploration_walk(protocols: dict[str, Protocol]) -> None:
+    hall = draw("hall", HALL)
+    rules = dataclasses.replace(protocols["var"], exploration=400)
+    episodes = frozen_episodes(hall, ["ring"], rules, seed=0)
+    assert [len(walk) for walk in episodes.walks] == [401, 401]
+    for source, walk in enumerate(episodes.walks):
+        own = episodes.start[episodes.source == source]
+        assert len(own) == 20
+        assert not set(own // 4) & set(walk // 4)
+    assert (episodes.walks[0] != episodes.walks[1]).any()
+
+
+def test_a_walk_that_leaves_too_few_starts_is_drawn_again_and_then_cut(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    # No walk of 5,000 steps leaves a cell of 51; it is cut where five cells are left.
+    rules = dataclasses.replace(protocols["var"], exploration=5000)
+    episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
+    goal = rules.goal_cells(two_rooms.grid, two_rooms.sources)
+    for source, walk in enumerate(episodes.walks):
+        assert 0 < len(walk) < 5000
+        left = ~goal[source]
+        left[walk // 4] = False
+        assert left.sum() == 5
+        own = episodes.start[episodes.source == source]
+        assert set((own // 4).tolist()) == set(np.flatnonzero(left).tolist())
+
+
+def test_visited_cells_of_another_walk_are_no_starts(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    visited = np.zeros(51, dtype=bool)
+    visited[:20] = True
+    episodes = frozen_episodes(two_rooms, ["ring"], protocols["var"], 0, visited)
+    assert (episodes.start // 4).min() >= 20
+
+
+def test_exhaustive_takes_every_start(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    episodes = exhaustive_episodes(two_rooms, SOUNDS, protocols["var"], seed=0)
+    assert len(episodes) == 3 * 2 * (51 - 9) * 4
+    key = np.stack((episodes.sound, episodes.source, episodes.start))
+    assert len(np.unique(key, axis=1).T) == len(episodes)
+
+
+def test_too_few_starts_name_the_room(protocols: dict[str, Protocol]) -> None:
+    with pytest.raises(UserError, match=r"protocol.starts: room 'hut' has only 16 starts"):
+        frozen_episodes(draw("hut", "Aaaaaa"), ["ring"], protocols["var"], seed=0)
+
+
+def test_keys_tell_episodes_apart(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    episodes = exhaustive_episodes(two_rooms, SOUNDS, protocols["var"], seed=0)
+    assert len(np.unique(episodes.keys())) == len(episodes)

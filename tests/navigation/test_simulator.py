@@ -1,0 +1,244 @@
+import dataclasses
+
+import pytest
+import torch
+from torch import Tensor
+
+from avn.navigation.episodes import Episodes, exhaustive_episodes
+from avn.navigation.place import DrawnPlace
+from avn.navigation.protocols import Protocol
+from avn.navigation.simulator import Simulator
+
+FORWARD, BACKWARD, LEFT, RIGHT, STOP = range(5)
+NORTH, EAST, SOUTH, WEST = range(4)
+
+
+def one(place: DrawnPlace, protocol: Protocol, cell: int, heading: int) -> Simulator:
+    """A simulator of one episode that begins at a cell and heading."""
+    every = exhaustive_episodes(place, ["ring"], protocol, seed=0)
+    return Simulator(
+        place, pick(every, (every.start == 4 * cell + heading).nonzero()[0][:1]), protocol
+    )
+
+
+def pick(episodes: Episodes, which: object) -> Episodes:
+    arrays = {name: getattr(episodes, name)[which] for name in ("number", "sound", "source")}
+    return dataclasses.replace(episodes, start=episodes.start[which], **arrays)
+
+
+def act(simulator: Simulator, *actions: int) -> list[bool]:
+    """Whether the episode is done after each action."""
+    done = []
+    for action in actions:
+        simulator.step(torch.tensor([action]))
+        done.append(bool(simulator.done))
+    return done
+
+
+def counts(simulator: Simulator) -> tuple[int, int, int, int]:
+    """Attempted and made moves, collisions, actions."""
+    numbers = (simulator.attempted, simulator.walked, simulator.collisions, simulator.actions)
+    return tuple(int(number) for number in numbers)  # type: ignore[return-value]
+
+
+def test_var_succeeds_on_arrival(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    simulator = one(corridor, protocols["var"], 3, WEST)
+    assert act(simulator, FORWARD, FORWARD) == [False, True]
+    assert simulator.success.item()
+    assert counts(simulator) == (2, 2, 0, 2)
+
+
+def test_backward_moves_against_the_heading_without_turning(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    simulator = one(corridor, protocols["var"], 4, EAST)
+    observation = simulator.step(torch.tensor([BACKWARD]))
+    assert simulator.state.item() == 4 * 3 + EAST
+    assert observation["odometry"].tolist() == [[0, -1, 0]]
+
+
+def test_a_blocked_move_collides_and_stays(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    simulator = one(corridor, protocols["var"], 5, NORTH)
+    assert simulator.step(torch.tensor([FORWARD]))["collided"].tolist() == [True]
+    assert simulator.state.item() == 4 * 5 + NORTH
+    assert simulator.step(torch.tensor([LEFT]))["collided"].tolist() == [False]
+    assert counts(simulator) == (1, 0, 1, 2)
+
+
+def test_var_ends_at_twice_the_moves_to_the_source_cell(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    # Three moves from the source cell, so that six may be attempted; rotations are free.
+    simulator = one(corridor, protocols["var"], 3, NORTH)
+    assert not any(act(simulator, *[RIGHT] * 20))
+    assert act(simulator, *[FORWARD] * 6) == [False] * 5 + [True]
+    assert not simulator.success.item()
+    assert counts(simulator) == (6, 0, 6, 26)
+
+
+def test_arrival_with_the_last_allowed_move_succeeds(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    simulator = one(corridor, protocols["var"], 2, WEST)
+    assert act(simulator, BACKWARD, BACKWARD, FORWARD, FORWARD) == [False] * 3 + [True]
+    assert not simulator.success.item()
+    simulator = one(corridor, protocols["var"], 3, WEST)
+    assert act(simulator, BACKWARD, BACKWARD, *[FORWARD] * 4) == [False] * 5 + [True]
+    assert simulator.success.item()
+
+
+@pytest.mark.parametrize("name", ["var", "var_stop", "stop"])
+def test_500_actions_of_any_kind_end_an_episode(
+    corridor: DrawnPlace, protocols: dict[str, Protocol], name: str
+) -> None:
+    simulator = one(corridor, protocols[name], 5, NORTH)
+    assert not any(act(simulator, *[LEFT] * 499))
+    assert act(simulator, LEFT) == [True]
+
+
+def test_var_stop_wants_stop_at_the_goal(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    simulator = one(corridor, protocols["var_stop"], 2, WEST)
+    assert act(simulator, FORWARD, STOP) == [False, True]
+    assert simulator.success.item()
+    assert counts(simulator) == (1, 1, 0, 2)
+    simulator = one(corridor, protocols["var_stop"], 2, WEST)
+    assert act(simulator, STOP) == [True]
+    assert not simulator.success.item()
+
+
+def test_var_stop_keeps_the_cap_on_moves(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    simulator = one(corridor, protocols["var_stop"], 2, WEST)
+    assert act(simulator, FORWARD, FORWARD, FORWARD, FORWARD) == [False] * 3 + [True]
+    assert not simulator.success.item()
+
+
+def test_stop_succeeds_within_a_metre_and_has_no_cap_on_moves(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    simulator = one(corridor, protocols["stop"], 3, WEST)
+    assert not any(act(simulator, *[FORWARD] * 40))
+    assert act(simulator, BACKWARD, BACKWARD, STOP) == [False, False, True]
+    assert simulator.success.item()
+    assert counts(simulator) == (42, 5, 37, 43)
+    simulator = one(corridor, protocols["stop"], 3, WEST)
+    assert act(simulator, STOP) == [True]
+    assert not simulator.success.item()
+
+
+def test_a_finished_episode_stands_still(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    simulator = one(corridor, protocols["var"], 2, WEST)
+    act(simulator, FORWARD, FORWARD, BACKWARD, LEFT)
+    assert simulator.state.item() == 4 * 1 + WEST
+    assert counts(simulator) == (1, 1, 0, 1)
+    assert simulator.success.item()
+
+
+@pytest.mark.parametrize(
+    ("heading", "expected"),
+    [(NORTH, [1, 2, 1]), (EAST, [-2, 1, 0]), (SOUTH, [-1, -2, 3]), (WEST, [2, -1, 2])],
+)
+def test_odometry_is_in_the_frame_of_the_start(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol], heading: int, expected: list[int]
+) -> None:
+    # Two cells north and one east, ending with the heading east.
+    cell = int((two_rooms.grid.lattice == [2, 0]).all(axis=1).nonzero()[0][0])
+    simulator = one(two_rooms, protocols["stop"], cell, heading)
+    observation = None
+    for action in [LEFT] * heading + [FORWARD, FORWARD, RIGHT, FORWARD]:
+        observation = simulator.step(torch.tensor([action]))
+    assert observation is not None
+    assert observation["odometry"].tolist() == [expected]
+
+
+def test_observations_hold_nothing_else(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    episodes = exhaustive_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
+    silent = Simulator(two_rooms, episodes, protocols["var"])
+    assert set(silent.reset().keys()) == {"collided", "odometry"}
+    hearing = Simulator(two_rooms, episodes, protocols["var"], torch.zeros(2, 204, 1, 4, 2))
+    assert set(hearing.reset().keys()) == {"collided", "odometry", "sound"}
+
+
+def numbered_hearing(sounds: int, takes: int) -> Tensor:
+    """Hearing whose features are the very indices, for two sources and 204 states."""
+    axes = (torch.arange(size) for size in (2, 204, sounds, takes))
+    return torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1)
+
+
+def test_hearing_is_of_the_source_the_state_and_the_sound(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    episodes = exhaustive_episodes(two_rooms, ["ring", "alarm"], protocols["var"], seed=0)
+    simulator = Simulator(two_rooms, episodes, protocols["var"], numbered_hearing(2, 4))
+    actions = torch.randint(4, (30, len(episodes)), generator=torch.Generator().manual_seed(0))
+    takes = []
+    for action in actions:
+        sound = simulator.step(action)["sound"]
+        assert (sound[:, 0] == simulator.source).all()
+        assert (sound[:, 1] == simulator.state).all()
+        assert (sound[:, 2] == simulator.sound).all()
+        takes.append(sound[:, 3][~simulator.done])
+    shares = torch.bincount(torch.cat(takes)) / len(torch.cat(takes))
+    assert torch.allclose(shares, torch.full((4,), 0.25), atol=0.02)
+
+
+def test_takes_do_not_depend_on_who_else_is_in_the_batch(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    rules = protocols["stop"]
+    every = exhaustive_episodes(two_rooms, ["ring"], rules, seed=0)
+    some = torch.arange(0, len(every), 7)
+    hearing = numbered_hearing(1, 4)
+    whole = Simulator(two_rooms, every, rules, hearing)
+    part = Simulator(two_rooms, pick(every, some.numpy()), rules, hearing)
+    assert (whole.reset()["sound"][some] == part.reset()["sound"]).all()
+    different = torch.zeros(len(some), dtype=torch.bool)
+    for _ in range(5):
+        before = whole.observe()["sound"][some]
+        action = torch.full((len(every),), LEFT)
+        heard, own = whole.step(action)["sound"][some], part.step(action[some])["sound"]
+        assert (heard == own).all()
+        different |= heard[:, 3] != before[:, 3]
+    assert different.float().mean() > 0.9
+
+
+def test_reset_begins_anew(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    episodes = exhaustive_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
+    simulator = Simulator(two_rooms, episodes, protocols["var"])
+    for action in (FORWARD, LEFT, FORWARD):
+        simulator.step(torch.full((len(episodes),), action))
+    observation = simulator.reset()
+    assert (simulator.state == torch.from_numpy(episodes.start)).all()
+    assert not observation["odometry"].any()
+    assert not simulator.done.any()
+    assert not simulator.actions.any()
+
+
+def test_wrong_actions_are_refused(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    simulator = one(corridor, protocols["var"], 5, NORTH)
+    with pytest.raises(ValueError, match="Stop is not an action under protocol 'var'"):
+        simulator.step(torch.tensor([STOP]))
+    with pytest.raises(ValueError, match="7 is no action"):
+        simulator.step(torch.tensor([7]))
+    with pytest.raises(ValueError, match="wanted"):
+        simulator.step(torch.tensor([0, 0]))
+    with pytest.raises(ValueError, match="int64"):
+        simulator.step(torch.tensor([0.0]))
+    assert counts(simulator) == (0, 0, 0, 0)
+
+
+def test_hearing_of_another_apartment_is_refused(
+    corridor: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
+    with pytest.raises(ValueError, match="hearing has shape"):
+        Simulator(corridor, episodes, protocols["var"], numbered_hearing(1, 1))

@@ -1,0 +1,166 @@
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from avn.errors import UserError
+from avn.reporting.results import (
+    EPISODE_COLUMNS,
+    RESULT_COLUMNS,
+    across_seeds,
+    compare,
+    headline,
+    summarise,
+    write_csv,
+)
+
+
+def episodes(
+    agent: str = "greedy", seed: int = 0, sounds: tuple[str, ...] = ("ring", "alarm")
+) -> pd.DataFrame:
+    """Records of two rooms with two sources; the second room has twice as many episodes."""
+    rng = np.random.default_rng([seed, *agent.encode()])
+    rows = [
+        {
+            "agent": agent,
+            "protocol": "var",
+            "acoustics": "resonance",
+            "look": "once",
+            "sound": sound,
+            "room": room,
+            "seed": seed,
+            "episode": source * count + index,
+            "start_cell": index,
+            "start_heading": 0,
+            "source": source,
+        }
+        for sound in sounds
+        for room, count in (("room_1", 10), ("room_2", 20))
+        for source in range(2)
+        for index in range(count)
+    ]
+    frame = pd.DataFrame(rows)
+    frame["success"] = rng.integers(0, 2, len(frame))
+    for column in ("spl", "softspl", "sna"):
+        frame[column] = frame["success"] * rng.random(len(frame))
+    frame["dtg"] = 5 * rng.random(len(frame))
+    return frame
+
+
+def only(results: pd.DataFrame, **labels: str) -> pd.Series:
+    for name, value in labels.items():
+        results = results[results[name] == value]
+    assert len(results) == 1
+    return results.iloc[0]
+
+
+def test_columns_are_the_published_ones() -> None:
+    assert ",".join(RESULT_COLUMNS) == (
+        "agent,protocol,acoustics,look,sound,room,seed,episodes,sr,spl,softspl,sna,dtg,"
+        "sr_low,sr_high,spl_low,spl_high,softspl_low,softspl_high,sna_low,sna_high,"
+        "dtg_low,dtg_high"
+    )
+    assert tuple(summarise(episodes()).columns) == RESULT_COLUMNS
+    assert EPISODE_COLUMNS[:8] == (*RESULT_COLUMNS[:7], "episode")
+
+
+def test_figures_are_means_by_sound_and_room() -> None:
+    frame = episodes()
+    results = summarise(frame)
+    assert len(results) == 3 * 3
+    own = frame[(frame["sound"] == "alarm") & (frame["room"] == "room_2")]
+    row = only(results, sound="alarm", room="room_2")
+    assert row["episodes"] == 40
+    for figure, column in (("sr", "success"), ("spl", "spl"), ("sna", "sna"), ("dtg", "dtg")):
+        assert row[figure] == pytest.approx(own[column].mean())
+        assert row[f"{figure}_low"] < row[figure] < row[f"{figure}_high"]
+
+
+def test_average_counts_every_room_the_same() -> None:
+    frame = episodes()
+    results = summarise(frame)
+    for sound in ("ring", "alarm", "all"):
+        rooms = [only(results, sound=sound, room=room)["spl"] for room in ("room_1", "room_2")]
+        assert only(results, sound=sound, room="average")["spl"] == pytest.approx(np.mean(rooms))
+    assert only(results, sound="all", room="room_1")["episodes"] == 40
+    assert only(results, sound="all", room="average")["episodes"] == 120
+    assert frame["spl"].mean() != pytest.approx(only(results, sound="all", room="average")["spl"])
+
+
+def test_one_sound_has_no_row_for_all() -> None:
+    results = summarise(episodes(sounds=("alarm",)))
+    assert set(results["sound"]) == {"alarm"}
+    assert headline(results)["sr"] == only(results, sound="alarm", room="average")["sr"]
+
+
+def test_headline_is_over_all_sounds_and_rooms() -> None:
+    results = summarise(episodes())
+    assert headline(results)["spl"] == only(results, sound="all", room="average")["spl"]
+    with pytest.raises(ValueError, match="one average"):
+        headline(summarise(pd.concat([episodes(), episodes("oracle")])))
+
+
+def test_no_episode_is_refused() -> None:
+    with pytest.raises(UserError, match="split: no episode"):
+        summarise(episodes().iloc[:0])
+
+
+def test_across_seeds_gives_mean_and_spread() -> None:
+    results = pd.concat([summarise(episodes(seed=seed)) for seed in range(3)])
+    table = across_seeds(results)
+    assert len(table) == 9
+    row = only(table, sound="all", room="average")
+    figures = results[(results["sound"] == "all") & (results["room"] == "average")]["sr"]
+    assert row["seeds"] == 3
+    assert row["sr"] == pytest.approx(figures.mean())
+    assert row["sr_std"] == pytest.approx(np.std(figures, ddof=1))
+
+
+def test_compare_pairs_the_episodes() -> None:
+    one, other = episodes(), episodes("oracle")
+    shuffled = other.sample(frac=1.0, random_state=0)
+    table = compare(one, shuffled).set_index("figure")
+    rooms = (one["dtg"] - other["dtg"]).groupby(one["room"]).mean()
+    assert table.loc["dtg", "difference"] == pytest.approx(rooms.mean())
+    assert (table["low"] < table["difference"]).all()
+    assert (table["difference"] < table["high"]).all()
+    # A constant gain is known exactly, however much the episodes differ.
+    better = one.assign(dtg=one["dtg"] - 0.5)
+    gain = compare(better, one).set_index("figure").loc["dtg"]
+    assert np.allclose(gain[["difference", "low", "high"]].to_numpy(dtype=float), -0.5)
+
+
+def test_compare_wants_the_same_episodes() -> None:
+    one = episodes()
+    with pytest.raises(UserError, match="same episodes"):
+        compare(one, episodes("oracle", sounds=("ring",)))
+    with pytest.raises(UserError, match="same episodes"):
+        compare(one, one.assign(start_heading=1))
+
+
+def test_write_csv_writes_what_can_be_read(tmp_path: Path) -> None:
+    results = summarise(episodes())
+    path = tmp_path / "run" / "results.csv"
+    write_csv(results, path)
+    pd.testing.assert_frame_equal(pd.read_csv(path), results, check_dtype=False)
+    first = path.read_bytes()
+    write_csv(summarise(episodes()), path)
+    assert path.read_bytes() == first
+
+
+def test_write_csv_leaves_nothing_half_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "results.csv"
+    write_csv(pd.DataFrame({"a": [1]}), path)
+
+    def broken(frame: pd.DataFrame, target: Path, **_: object) -> None:
+        Path(target).write_text("half", encoding="utf-8")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(pd.DataFrame, "to_csv", broken)
+    with pytest.raises(OSError, match="disk full"):
+        write_csv(pd.DataFrame({"a": [2]}), path)
+    assert path.read_text(encoding="utf-8") == "a\n1\n"
+    assert list(tmp_path.iterdir()) == [path]
