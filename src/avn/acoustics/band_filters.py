@@ -1,0 +1,71 @@
+"""From energies in six octave bands to samples.
+
+The bands overlap so that their amplitudes sum to one at every frequency: what has equal energy in
+all bands, like the echo of a flat surface, stays a single sample. The lowest band reaches down to
+0 Hz and the highest up to half the sampling rate.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avn.acoustics.materials import BANDS
+
+HALF = 160  # samples on either side of the middle of a band filter
+_GRID = 4096  # points of the spectra from which filters are made
+_KAISER = 3.0  # shape of the window: a compromise of edge and ripple
+
+
+def band_weights(frequencies: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Amplitude of each band at given frequencies, shape (6, ...); sums to 1 over bands.
+
+    Between two neighbouring centres the amplitude crosses over as a raised cosine of the logarithm
+    of frequency.
+    """
+    low, high = np.log2(BANDS[0]), np.log2(BANDS[-1])
+    octave = np.clip(np.log2(np.maximum(frequencies, 1e-3)), low, high) - low
+    away = np.abs(octave[None] - np.arange(len(BANDS)).reshape(-1, *[1] * frequencies.ndim))
+    weights: NDArray[np.float64] = np.where(away < 1, np.cos(0.5 * np.pi * away) ** 2, 0.0)
+    return weights
+
+
+@lru_cache(maxsize=4)
+def band_firs(rate: int) -> NDArray[np.float32]:
+    """Symmetric filters of the bands, shape (6, 2 HALF + 1); they sum to a unit impulse."""
+    spectrum = band_weights(np.fft.rfftfreq(_GRID, 1 / rate))
+    response = np.fft.fftshift(np.fft.irfft(spectrum, axis=1), axes=1)
+    middle = _GRID // 2
+    firs = response[:, middle - HALF : middle + HALF + 1] * np.kaiser(2 * HALF + 1, _KAISER)
+    result = firs.astype(np.float32)
+    result.setflags(write=False)
+    return result
+
+
+def minimum_phase(gains: NDArray[np.float64], rate: int, taps: int) -> NDArray[np.float64]:
+    """Causal filters with the given amplitude in each band.
+
+    Parameters
+    ----------
+    gains : array, shape (N, 6)
+        Amplitudes, above 0.
+    rate, taps : int
+        Sampling rate in Hz, and length of the filters.
+
+    Returns
+    -------
+    array, shape (N, taps)
+        Nothing sounds before its time: sample 0 is the start. Made by folding the cepstrum
+        (Oppenheim and Schafer, *Discrete-Time Signal Processing*, section 13.8).
+    """
+    weights = band_weights(np.fft.rfftfreq(_GRID, 1 / rate))
+    cepstrum = np.fft.irfft(np.log(np.maximum(gains, 1e-6) @ weights), axis=1)
+    folded = np.zeros_like(cepstrum)
+    folded[:, 0] = cepstrum[:, 0]
+    folded[:, 1 : _GRID // 2] = 2 * cepstrum[:, 1 : _GRID // 2]
+    folded[:, _GRID // 2] = cepstrum[:, _GRID // 2]
+    response = np.fft.irfft(np.exp(np.fft.rfft(folded, axis=1)), axis=1)[:, :taps]
+    fade = np.ones(taps)
+    fade[taps // 2 :] = np.cos(0.5 * np.pi * np.linspace(0, 1, taps - taps // 2)) ** 2
+    result: NDArray[np.float64] = response * fade
+    return result

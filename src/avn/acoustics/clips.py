@@ -1,0 +1,275 @@
+"""Clips: one second of what two ears hear in the steady state, rendered in batches.
+
+A clip is a second of the looped dry sound, at a random place and with a random circular phase, in
+circular convolution with a binaural room impulse response (BRIR), over the noise of a microphone.
+The sound is as if it had been going on for ever: no onset betrays the time of flight.
+
+What is random in a clip is a pure function of integers (seed, purpose, source, state, sound, take),
+by a counter-based hash, so that any clip can be rendered at any time, alone or in any batch.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+import soundfile
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn.functional import pad
+
+from avn.acoustics.counter_hash import absorb, integers
+from avn.acoustics.dry_sounds import RATE
+from avn.errors import UserError
+from avn.stages import written_whole
+
+CLIP_SAMPLES = RATE
+PURPOSES = ("train", "eval")
+
+FADE_SAMPLES = 160  # 10 ms over which the end of a second passes into its beginning
+HOP = 160  # grid of the places where a second may begin
+LEAST_LEVEL = 0.5  # of the usual level of the sound: -6 dB
+NOISE_SAMPLES = 1 << 19  # 33 s of noise an ear
+EXPORT_FACTOR = 0.1
+
+
+@dataclass
+class MicrophoneConfig:
+    """Config node `microphone`.
+
+    Attributes
+    ----------
+    noise_rms : float
+        RMS of each microphone's noise. Dry sounds have RMS 1, so the direct sound of a source at
+        1 m in front has 1 / sqrt(4 pi) = 0.28, which is 35 dB above the default; three rooms
+        away, some 24 dB weaker, sound still stands 11 dB above it.
+    gain : float
+        Factor on the sound at the microphone, before its noise.
+    """
+
+    noise_rms: float = 0.005
+    gain: float = 1.0
+
+
+def check_microphone(config: MicrophoneConfig) -> None:
+    """Raise UserError where a value of the config node `microphone` makes no sense."""
+    if not (isfinite(config.noise_rms) and config.noise_rms >= 0):
+        raise UserError(f"microphone.noise_rms={config.noise_rms}: give 0 or more, such as 0.005")
+    if not (isfinite(config.gain) and config.gain > 0):
+        raise UserError(f"microphone.gain={config.gain}: give more than 0, such as 1.0")
+
+
+class DrySounds:
+    """A bank of looped dry sounds, from which seconds are cut in batches.
+
+    A second never begins where it would be much weaker than the sound usually is (half its level):
+    a long recording with pauses is heard, not missed. Each sound is scaled so that the seconds
+    that can be drawn have unit RMS on average. For a steady sound that is the RMS of the
+    recording; one that is mostly silent does not grow louder by its pauses.
+
+    Parameters
+    ----------
+    sounds : mapping
+        Name to float array (n,) at 16 kHz with n >= 16000, as `load_sounds` gives it.
+    device : torch.device or str
+        Where the bank lies and seconds are cut.
+    """
+
+    def __init__(
+        self,
+        sounds: Mapping[str, NDArray[np.float32]],
+        device: torch.device | str = "cpu",
+    ) -> None:
+        self.names = tuple(sounds)
+        waves, places, offset = [], [], 0
+        for samples in sounds.values():
+            looped, starts = _prepare(samples)
+            waves.append(looped)
+            places.append(starts + offset)
+            offset += len(looped)
+        longest = max(map(len, places))
+        table = np.stack([np.resize(starts, longest) for starts in places])
+        self._wave = torch.from_numpy(np.concatenate(waves)).to(device)
+        self._places = torch.from_numpy(table).to(device)
+        self._counts = torch.tensor([len(starts) for starts in places], device=device)
+        # By its name, so that a clip of a sound is the same whichever sounds are beside it.
+        keys = [
+            int.from_bytes(sha256(name.encode()).digest()[:8], "little", signed=True)
+            for name in self.names
+        ]
+        self.keys = torch.tensor(keys, dtype=torch.int64, device=device)
+        ramp = torch.arange(1, FADE_SAMPLES + 1, dtype=torch.float32, device=device)
+        self._fade_in = ramp / (FADE_SAMPLES + 1)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def seconds(self, sound: Tensor, place: Tensor, phase: Tensor) -> Tensor:
+        """Cut one circular second for each clip.
+
+        Parameters
+        ----------
+        sound : int64 tensor, shape (N,)
+            Index into ``names``.
+        place, phase : int64 tensor, shape (N,)
+            Non-negative random integers, of which remainders decide where in the recording the
+            second begins and by how many samples it is rolled.
+
+        Returns
+        -------
+        float32 tensor, shape (N, 16000)
+            Its last sample leads over into its first: a cross-fade of 10 ms takes the seam away.
+        """
+        starts = self._places[sound, place % self._counts[sound]]
+        cut = self._wave.unfold(0, CLIP_SAMPLES + FADE_SAMPLES, 1)[starts]
+        second, beyond = cut[:, :CLIP_SAMPLES], cut[:, CLIP_SAMPLES:]
+        second[:, :FADE_SAMPLES].mul_(self._fade_in).add_(beyond * (1 - self._fade_in))
+        twice = torch.cat([second, second], dim=1).flatten()
+        rows = torch.arange(len(sound), device=twice.device) * (2 * CLIP_SAMPLES)
+        return twice.unfold(0, CLIP_SAMPLES, 1)[rows + phase % CLIP_SAMPLES]
+
+
+class ClipRenderer:
+    """Renders clips of a bank of sounds, with one microphone, seed and purpose.
+
+    Parameters
+    ----------
+    sounds : DrySounds
+        The bank; clips are rendered on its device.
+    microphone : MicrophoneConfig
+        Noise floor and gain.
+    seed : int
+        Seed of all that is random.
+    purpose : str
+        "train" or "eval": clips of the two are drawn apart.
+
+    Raises
+    ------
+    UserError
+        The microphone's config makes no sense.
+    ValueError
+        The purpose is another word.
+    """
+
+    def __init__(
+        self, sounds: DrySounds, microphone: MicrophoneConfig, seed: int, purpose: str
+    ) -> None:
+        check_microphone(microphone)
+        self.sounds = sounds
+        self.microphone = microphone
+        device = sounds.keys.device
+        words = torch.tensor([int(seed), PURPOSES.index(purpose)], device=device)
+        self._key = absorb(torch.zeros((), dtype=torch.int64, device=device), words)
+        # One half of the bank for each ear, so that the ears never share a piece of noise.
+        noise = np.random.default_rng(int(seed) % 2**64).standard_normal((2, NOISE_SAMPLES))
+        self._noise = torch.from_numpy(noise.astype(np.float32)).to(device)
+
+    def render(
+        self,
+        spectra: Tensor,
+        source: Tensor,
+        state: Tensor,
+        sound: Tensor,
+        take: Tensor,
+        index: Tensor | None = None,
+    ) -> Tensor:
+        """Render clips.
+
+        Parameters
+        ----------
+        spectra : complex64 tensor, shape (N, 2, 8001)
+            `brir_spectra` of each clip's BRIR; with ``index`` (M, 2, 8001), each used by many.
+        source, state, sound, take : int64 tensors, shape (N,)
+            Which clip it is. ``sound`` is an index into the bank's names; the others only enter
+            the draw.
+        index : int64 tensor, shape (N,), optional
+            Row of ``spectra`` for each clip.
+
+        Returns
+        -------
+        float32 tensor, shape (N, 2, 16000)
+            Left and right ear. 16 to 128 clips a call are fastest on a CPU, for its caches.
+        """
+        words = torch.stack([source, state, self.sounds.keys[sound], take], dim=-1)
+        key = absorb(self._key, words.to(torch.int64))
+        place, phase, left, right = (integers(key, draw) for draw in range(4))
+        dry = torch.fft.rfft(self.sounds.seconds(sound, place, phase))
+        used = spectra if index is None else spectra[index]
+        clips = torch.fft.irfft(dry[:, None, :] * used, n=CLIP_SAMPLES)
+        if self.microphone.gain != 1:
+            clips *= self.microphone.gain
+        if self.microphone.noise_rms > 0:
+            for ear, draw in enumerate((left, right)):
+                pieces = self._noise[ear].unfold(0, CLIP_SAMPLES, 1)
+                noise = pieces[draw % len(pieces)]
+                clips[:, ear].add_(noise, alpha=self.microphone.noise_rms)
+        return clips
+
+
+def brir_spectra(brirs: Tensor) -> Tensor:
+    """Spectra of BRIRs over one second, for `ClipRenderer.render`.
+
+    Parameters
+    ----------
+    brirs : float32 tensor, shape (N, 2, T)
+        A response longer than a second is folded onto one, which is exact in the steady state of
+        a sound that repeats every second.
+
+    Returns
+    -------
+    complex64 tensor, shape (N, 2, 8001)
+    """
+    samples = brirs.shape[-1]
+    if samples > CLIP_SAMPLES:
+        folds = -(-samples // CLIP_SAMPLES)
+        padded = pad(brirs, (0, folds * CLIP_SAMPLES - samples))
+        brirs = padded.unflatten(-1, (folds, CLIP_SAMPLES)).sum(dim=-2)
+    return torch.fft.rfft(brirs, n=CLIP_SAMPLES)
+
+
+def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32]) -> None:
+    """Write a clip as a stereo WAV file of 16 bits, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Where to; the folder is made if it is missing. ``~`` is the home directory.
+    clip : array or tensor, shape (2, n)
+        Left and right ear. Samples are multiplied by 0.1, the same for every clip, so that levels
+        compare by ear; what is still beyond full scale is clipped.
+
+    Raises
+    ------
+    UserError
+        The file cannot be written.
+    """
+    target = Path(path).expanduser()
+    samples = clip.detach().cpu().numpy() if isinstance(clip, Tensor) else np.asarray(clip)
+    scaled = np.clip(EXPORT_FACTOR * samples.T, -1.0, 1.0)
+    try:
+        with written_whole(target) as part:
+            soundfile.write(part, scaled, RATE, format="WAV", subtype="PCM_16")
+    except (OSError, soundfile.SoundFileError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise UserError(f"{target} cannot be written ({reason}); choose another place") from None
+
+
+def _prepare(samples: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Loop a sound far enough for any cut, and list where a second may begin.
+
+    Returns the scaled wave, longer by a second and a fade, and the places (P,) within it.
+    """
+    wave = np.asarray(samples, dtype=np.float64)
+    looped = np.resize(wave, len(wave) + CLIP_SAMPLES + FADE_SAMPLES)
+    energy = np.concatenate([[0.0], np.cumsum(looped**2)])
+    starts = np.arange(0, len(wave), HOP)
+    power = (energy[starts + CLIP_SAMPLES] - energy[starts]) / CLIP_SAMPLES
+    # The usual power is a mean weighted by the power itself: pauses do not count, and the
+    # loudest second is never below it.
+    usual = (power**2).sum() / power.sum()
+    chosen = power >= LEAST_LEVEL**2 * usual
+    level = np.sqrt(power[chosen].mean())
+    return (looped / level).astype(np.float32), starts[chosen]

@@ -1,0 +1,92 @@
+"""Measured head-related impulse responses, as filters of third-order ambisonic channels.
+
+The set is that of Omnitone 1.3.0 (Apache-2.0), made from the SADIE measurements of a KU 100 dummy
+head; credit and licence lie beside it in ``assets/hrirs``. The head is taken as symmetric: the set
+holds the left ear, and the right ear is its mirror image.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from math import gcd
+
+import numpy as np
+import soundfile
+from numpy.typing import NDArray
+from scipy.signal import resample_poly
+
+from avn.acoustics.ambisonics import CHANNELS, DEGREES, rotation_to_heading, sh
+
+HEADINGS = 4
+
+
+@dataclass(frozen=True)
+class ShHrirs:
+    """Spherical-harmonic HRIRs of the left ear.
+
+    Attributes
+    ----------
+    left : array, shape (16, taps)
+        Impulse responses that are applied to the ambisonic channels (ACN, SN3D) in the frame of
+        the head and summed. As stored: int16 full scale is 1.
+    rate : int
+        Sampling rate in Hz.
+    """
+
+    left: NDArray[np.float64]
+    rate: int
+
+    def filters(self, rate: int = 16000) -> NDArray[np.float32]:
+        """Filters from a world-north ambisonic impulse response to the ears of an agent.
+
+        Parameters
+        ----------
+        rate : int
+            Sampling rate wanted, in Hz.
+
+        Returns
+        -------
+        float32 array, shape (4, 2, 16, taps)
+            Heading (0 north, 1 east, 2 south, 3 west), ear (0 left, 1 right), channel, tap.
+            The sum over channels of ``filters[h, e] * response`` is the binaural response of an
+            agent that faces h.
+
+        Notes
+        -----
+        Level: one constant scales all of it, so that a plane wave of unit amplitude from the front
+        arrives with unit energy, averaged over the two ears: the squares of the taps sum to 1,
+        which makes the mean of |H|^2 from 0 Hz to half the sampling rate 1. So a binaural response
+        has the level that an omnidirectional microphone would pick up in front.
+        """
+        common = gcd(rate, self.rate)
+        up, down = rate // common, self.rate // common
+        # `resample_poly` keeps the height of an impulse response, while its spectrum has to stay:
+        # the sum over `down / up` times as few taps needs as much more height.
+        left = resample_poly(self.left, up, down, axis=1) * (down / up)
+        ears = np.stack([left, np.where(DEGREES[:, None] < 0, -left, left)])
+        front = np.einsum("ect,c->et", ears, sh([0.0, 1.0, 0.0]))
+        ears /= np.sqrt((front**2).sum(axis=1).mean())
+        turned = [
+            np.einsum("edt,dc->ect", ears, rotation_to_heading(heading))
+            for heading in range(HEADINGS)
+        ]
+        return np.stack(turned).astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def load_sh_hrirs() -> ShHrirs:
+    """The SH-HRIRs that the package ships.
+
+    Returns
+    -------
+    ShHrirs
+        16 channels of 256 taps at 48 kHz.
+    """
+    asset = resources.files("avn") / "assets" / "hrirs" / "omnitone_third_order.wav"
+    with resources.as_file(asset) as path:
+        samples, rate = soundfile.read(path, dtype="float64", always_2d=True)
+    if samples.shape[1] != CHANNELS:
+        raise RuntimeError(f"the HRIR asset has {samples.shape[1]} channels, not {CHANNELS}")
+    left = np.ascontiguousarray(samples.T)
+    left.setflags(write=False)
+    return ShHrirs(left=left, rate=int(rate))

@@ -1,0 +1,141 @@
+"""From what a listener receives, reflection by reflection, to the sound at the ears.
+
+Every event becomes +- sqrt(energy of the band) x filter of the band x spherical harmonics of its
+direction: an ambisonic impulse response in the world's frame. The filters of
+`avn.acoustics.hrtf` make the two ears of all four headings of it in one product.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import fft
+
+from avn.acoustics.ambisonics import CHANNELS, sh
+from avn.acoustics.band_filters import HALF, band_firs
+from avn.acoustics.materials import SPEED_OF_SOUND
+from avn.acoustics.tracer import Events
+
+_TOGETHER = 8  # listeners whose spectra are worked on at once; keeps them in the cache
+
+
+@njit(cache=True, fastmath=True)
+def _scatter(place, amplitudes, harmonics, firs, out) -> None:  # type: ignore[no-untyped-def]
+    """Add the events of one listener to `out` (channels, samples), which leads by HALF.
+
+    Slices of rows and a sum over the six bands that is written out make the compiler use vector
+    instructions: more than twice as fast as plain indices.
+    """
+    taps = firs.shape[1]
+    shape = np.empty(taps, dtype=np.float32)
+    for event in range(place.shape[0]):
+        a = amplitudes[event]
+        a0, a1, a2, a3, a4, a5 = a[0], a[1], a[2], a[3], a[4], a[5]
+        for tap in range(taps):
+            shape[tap] = (
+                a0 * firs[0, tap]
+                + a1 * firs[1, tap]
+                + a2 * firs[2, tap]
+                + a3 * firs[3, tap]
+                + a4 * firs[4, tap]
+                + a5 * firs[5, tap]
+            )
+        start = place[event]
+        for channel in range(out.shape[0]):
+            value = harmonics[event, channel]
+            row = out[channel, start : start + taps]
+            for tap in range(taps):
+                row[tap] += value * shape[tap]
+
+
+@njit(cache=True, fastmath=True)
+def _filter_and_sum(spectra, filters, out) -> None:  # type: ignore[no-untyped-def]
+    """out[l, o, k] = sum over c of filters[o, c, k] * spectra[l, c, k], block by block of k."""
+    bins = spectra.shape[2]
+    block = 128
+    for begin in range(0, bins, block):
+        end = min(begin + block, bins)
+        for person in range(spectra.shape[0]):
+            for ear in range(filters.shape[0]):
+                total = out[person, ear, begin:end]
+                total[:] = 0.0
+                for channel in range(filters.shape[1]):
+                    gain = filters[ear, channel, begin:end]
+                    field = spectra[person, channel, begin:end]
+                    for k in range(end - begin):
+                        total[k] += gain[k] * field[k]
+
+
+@dataclass(frozen=True)
+class Binaural:
+    """Filters of the heads in the frequency domain, for responses of one length.
+
+    `spectra` (8, 16, bins): heading x ear, channel; `size` is the length of the transform.
+    """
+
+    spectra: NDArray[np.complex64]
+    size: int
+    samples: int
+
+    @classmethod
+    def prepare(cls, filters: NDArray[np.float32], samples: int) -> "Binaural":
+        """Transform `hrtf.ShHrirs.filters()` for responses of `samples` samples."""
+        # What runs past the end wraps round to before the beginning, where it is dropped.
+        size = int(fft.next_fast_len(samples + HALF + filters.shape[-1], real=True))
+        flat = filters.reshape(-1, *filters.shape[2:]).astype(np.float32)
+        return cls(fft.rfft(flat, size, axis=-1).astype(np.complex64), size, samples)
+
+
+def ambisonic_responses(events: Events, first: int, last: int, size: int, rate: int) -> NDArray:
+    """Ambisonic impulse responses of listeners `first` to `last`, shape (n, 16, size), float32.
+
+    Sample HALF is time 0, so that the symmetric filters of the bands have room before it.
+    """
+    firs = band_firs(rate)
+    out = np.zeros((last - first, CHANNELS, size + firs.shape[1]), dtype=np.float32)
+    begin, end = events.starts[first], events.starts[last]
+    place = np.rint(events.distance[begin:end] * (rate / SPEED_OF_SOUND)).astype(np.int64)
+    amplitudes = np.sqrt(events.energy[begin:end]) * events.sign[begin:end, None]
+    harmonics = sh(events.arrival[begin:end]).astype(np.float32)
+    bounds = events.starts[first : last + 1] - begin
+    for person in range(last - first):
+        own = np.arange(bounds[person], bounds[person + 1])
+        own = own[place[own] < round(events.seconds * rate)]
+        _scatter(place[own], amplitudes[own], harmonics[own], firs, out[person])
+    return out[:, :, :size]
+
+
+def binaural_responses(
+    events: Events, binaural: Binaural, rate: int
+) -> tuple[NDArray[np.int16], NDArray[np.float32]]:
+    """Responses at the ears of every listener in the four headings.
+
+    Returns
+    -------
+    samples : int16 array, shape (L, 4, 2, samples)
+    scale : float32 array, shape (L,)
+        One for each listener; samples x scale is the response.
+    """
+    people = len(events.starts) - 1
+    outputs = binaural.spectra.shape[0]
+    result = np.empty((people, outputs, binaural.samples), dtype=np.int16)
+    scale = np.zeros(people, dtype=np.float32)
+    for first in range(0, people, _TOGETHER):
+        last = min(first + _TOGETHER, people)
+        field = ambisonic_responses(events, first, last, binaural.size, rate)
+        spectra = fft.rfft(field, axis=-1)
+        ears = np.empty((last - first, outputs, spectra.shape[2]), dtype=np.complex64)
+        _filter_and_sum(spectra, binaural.spectra, ears)
+        heard = fft.irfft(ears, binaural.size, axis=-1)[..., HALF : HALF + binaural.samples]
+        result[first:last], scale[first:last] = to_int16(heard)
+    return result.reshape(people, 4, 2, binaural.samples), scale
+
+
+def to_int16(responses: NDArray) -> tuple[NDArray[np.int16], NDArray[np.float32]]:
+    """Store responses (n, ...) as int16 with one scale each; silence has scale 0."""
+    flat = np.asarray(responses, dtype=np.float32).reshape(len(responses), -1)
+    scale = (np.abs(flat).max(axis=1, initial=0.0) / 32767).astype(np.float32)
+    factor = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    samples = np.rint(flat * factor[:, None]).astype(np.int16)
+    return samples.reshape(responses.shape), scale

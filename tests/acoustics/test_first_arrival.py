@@ -1,0 +1,223 @@
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import spearmanr
+
+from avn.acoustics.ambisonics import sh
+from avn.acoustics.brir import AcousticsConfig, combine, render_first_arrivals, render_source
+from avn.acoustics.corners import paths_round_corners, sees
+from avn.acoustics.first_arrival import (
+    FirstArrivals,
+    band_energies,
+    find_paths,
+    screen_loss,
+)
+from avn.acoustics.hrtf import load_sh_hrirs
+from avn.acoustics.materials import SPEED_OF_SOUND
+from avn.apartments.floor_plan import Doorway, FloorPlan, Room
+from avn.apartments.grid import build_grid
+from avn.apartments.surfaces import build_surfaces
+from avn.apartments.walls import walls
+from avn.errors import UserError
+
+RESONANCE = AcousticsConfig()
+DIFFRACTION = AcousticsConfig(name="diffraction", first_arrival="round_corners")
+NO_WALLS = np.zeros((0, 4))
+EAR = np.array([[0.0, 0.0, 1.5]])
+FINE = 1_536_000  # Hz: cross-correlations are interpolated to this
+
+
+def around(degrees: float, distance: float = 2.0) -> NDArray[np.float64]:
+    """A place at ear height, `degrees` to the right of north."""
+    angle = np.deg2rad(degrees)
+    return np.array([distance * np.sin(angle), distance * np.cos(angle), 1.5])
+
+
+def responses(first: FirstArrivals) -> NDArray[np.float64]:
+    return first.samples * first.scale[:, None, None, None].astype(np.float64)
+
+
+def cues(ears: NDArray[np.float64], rate: int) -> tuple[float, float]:
+    """ITD in microseconds (positive: the right ear first) and ILD in dB (right louder).
+
+    The ITD stems from below 1.5 kHz, where ears use it and third order holds; it is the peak of the
+    cross-correlation, interpolated by zeros in its spectrum. The ILD is that up to 8 kHz.
+    """
+    size = rate // 10
+    frequencies = np.fft.rfftfreq(size, 1 / rate)
+    spectra = np.fft.rfft(ears, size) * (frequencies < 8000)
+    cross = np.zeros(FINE // 20 + 1, dtype=complex)
+    cross[: len(frequencies)] = spectra[0] * np.conj(spectra[1]) * (frequencies < 1500)
+    correlation = np.fft.irfft(cross)
+    lags = np.concatenate([np.arange(2000), np.arange(-2000, 0)])
+    lag = lags[correlation[lags].argmax()]
+    power = (np.abs(spectra) ** 2).sum(axis=1)
+    return float(lag / FINE * 1e6), float(10 * np.log10(power[1] / power[0]))
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("degrees", [0, 30, 60, 90])
+@pytest.mark.parametrize("heading", [0, 1, 2, 3])
+def test_time_and_level_differences_are_those_of_the_hrirs(
+    side: int, degrees: int, heading: int
+) -> None:
+    source = around(90 * heading + side * degrees)
+    first = render_first_arrivals(NO_WALLS, source, EAR, RESONANCE)
+    time, level = cues(responses(first)[0, heading], RESONANCE.rate)
+    # The set itself, at its own rate: the left ear, and as the right ear its mirror image.
+    hrirs = load_sh_hrirs()
+    mirrored = np.stack([around(side * degrees, 1.0), around(-side * degrees, 1.0)])
+    weights = sh(mirrored * [1, 1, 0])
+    wanted_time, wanted_level = cues(weights @ hrirs.left, hrirs.rate)
+    assert time == pytest.approx(wanted_time, rel=0.1, abs=5)
+    assert level == pytest.approx(wanted_level, rel=0.1, abs=0.1)
+    if degrees == 0:
+        assert abs(time) < 5
+        assert abs(level) < 0.1
+    else:
+        assert side * time > 200
+        assert side * level > 5
+
+
+def test_the_level_falls_as_one_over_distance() -> None:
+    for distance in (0.5, 2.0, 7.0):
+        first = render_first_arrivals(NO_WALLS, around(0, distance), EAR, RESONANCE)
+        energy = (responses(first)[0, 0] ** 2).sum(axis=-1).mean()
+        assert energy == pytest.approx(1 / (4 * np.pi * distance**2), rel=1e-3)
+        assert first.onset[0] == round(distance / SPEED_OF_SOUND * 16000)
+
+
+def test_the_spectrum_does_not_betray_the_time_of_flight() -> None:
+    """Arrivals start on whole samples: but for its level, the taps are the same at any distance."""
+    near, far = (
+        render_first_arrivals(NO_WALLS, around(40, distance), EAR, RESONANCE)
+        for distance in (1.0, 6.1234)
+    )
+    assert near.onset[0] != far.onset[0]
+    assert np.abs(near.samples.astype(int) - far.samples).max() <= 1
+
+
+def three_rooms() -> FloorPlan:
+    rooms = tuple(
+        Room("bedroom", x, 0.0, x + 3, 5.0, "parquet", "plaster", "ceiling_plaster")
+        for x in (0.0, 3.0, 6.0)
+    )
+    return FloorPlan("three", rooms, (Doorway(3, 1, "y"), Doorway(6, 4, "y")))
+
+
+def bearing(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.rad2deg(np.arctan2(vector[..., 0], vector[..., 1]))
+
+
+def test_round_corners_the_first_arrival_comes_from_the_doorway() -> None:
+    source = np.array([1.0, 4.0, 1.0])
+    listeners = np.array([[4.5, 3.0, 1.5], [5.5, 4.0, 1.5], [3.5, 2.5, 1.5]])
+    paths = find_paths("round_corners", walls(three_rooms()), source, listeners)
+    assert paths.bent.all()
+    doorway = np.array([3.0, 1.0])
+    off = bearing(paths.arrival[:, :2]) - bearing(doorway - listeners[:, :2])
+    reach = np.linalg.norm(listeners[:, :2] - doorway, axis=1)
+    # Within the half width of the doorway, as it is seen from there.
+    assert (np.abs(off) < np.rad2deg(np.arctan2(0.46, reach))).all()
+    # The straight line would come from elsewhere.
+    straight = find_paths("through_walls", walls(three_rooms()), source, listeners)
+    away = np.abs(bearing(straight.arrival[:, :2]) - bearing(doorway - listeners[:, :2]))
+    assert (away > 20).all()
+
+
+def test_ears_hear_the_doorway_and_not_the_wall() -> None:
+    """Facing west in the middle room, the doorway is on the left and the source on the right."""
+    source, listener = np.array([1.0, 4.5, 1.0]), np.array([[4.0, 3.0, 1.5]])
+    for config, louder in ((DIFFRACTION, 0), (RESONANCE, 1)):
+        first = render_first_arrivals(walls(three_rooms()), source, listener, config)
+        energy = (responses(first)[0, 3] ** 2).sum(axis=-1)
+        assert energy.argmax() == louder
+        assert abs(10 * np.log10(energy[0] / energy[1])) > 3
+
+
+def test_the_way_round_one_screen_is_the_length_of_its_legs() -> None:
+    screen = np.array([[-10.0, -0.05, 1.0, 0.05]])
+    source, listener = np.array([-1.0, -2.0, 1.0]), np.array([[-1.0, 2.0, 1.5]])
+    paths = paths_round_corners(screen, source, listener)
+    plan = 2 * np.hypot(2.0, 1.95) + 0.1
+    assert paths.length[0] == pytest.approx(np.hypot(plan, 0.5), abs=0.01)
+    assert paths.detour[0] == pytest.approx(paths.length[0] - np.sqrt(16.25), abs=1e-9)
+    corner = np.array([1.0, 0.05]) - listener[0, :2]
+    assert paths.arrival[0, :2] / np.hypot(*paths.arrival[0, :2]) == pytest.approx(
+        corner / np.hypot(*corner), abs=2e-3
+    )
+    assert np.linalg.norm(paths.arrival[0]) == pytest.approx(1.0)
+    assert paths.arrival[0, 2] == pytest.approx(-0.5 / paths.length[0], abs=1e-3)
+
+
+def test_the_screen_weakens_high_bands_more() -> None:
+    assert screen_loss(np.zeros(1))[0] == pytest.approx([10 * np.log10(3)] * 6)
+    loss = screen_loss(np.array([0.5]))[0]
+    assert (np.diff(loss) > 2).all()
+    # N = 2 x 0.5 m / 0.343 m at 1 kHz
+    assert loss[3] == pytest.approx(10 * np.log10(3 + 20 / 0.343))
+
+
+def test_rendered_bands_have_the_energy_of_the_formula() -> None:
+    source, listener = np.array([1.0, 4.0, 1.0]), np.array([[5.5, 4.0, 1.5]])
+    plan_walls = walls(three_rooms())
+    first = render_first_arrivals(plan_walls, source, listener, DIFFRACTION)
+    paths = find_paths("round_corners", plan_walls, source, listener)
+    wanted = band_energies(paths)[0]
+    free = render_first_arrivals(NO_WALLS, listener[0] + 2 * paths.arrival[0], listener, RESONANCE)
+    # Against the same direction in the open only the loss is left.
+    spectra = [np.abs(np.fft.rfft(responses(f)[0, 3, 0], 16000)) for f in (first, free)]
+    loss = (spectra[0] / spectra[1])[[250, 500, 1000, 2000, 4000]] ** 2 / (4 * np.pi * 4)
+    assert 10 * np.log10(loss / wanted[1:]) == pytest.approx(np.zeros(5), abs=1.0)
+
+
+def test_walls_in_sight_change_nothing() -> None:
+    plan_walls = walls(three_rooms())
+    source, listeners = np.array([1.0, 1.0, 1.0]), np.array([[2.0, 4.0, 1.5], [5.0, 1.0, 1.5]])
+    one = find_paths("round_corners", plan_walls, source, listeners)
+    other = find_paths("through_walls", plan_walls, source, listeners)
+    assert not one.bent.any()
+    assert np.array_equal(one.length, other.length)
+    assert np.array_equal(one.arrival, other.arrival)
+
+
+def test_lines_that_graze_a_wall_see_and_lines_through_it_do_not() -> None:
+    wall = np.array([[1.0, 0.0, 2.0, 4.0]])
+    start = np.array([[0.0, 2.0], [0.0, 4.001], [1.5, 5.0], [1.5, 5.0], [0.0, 3.0]])
+    end = np.array([[3.0, 2.0], [3.0, 4.001], [1.5, 4.001], [1.5, 3.0], [0.5, 3.0]])
+    assert sees(wall, start, end).tolist() == [False, True, True, False, True]
+
+
+def test_a_closed_room_lets_no_first_arrival_in() -> None:
+    box = np.array([[2, 2, 4, 2.1], [2, 3.9, 4, 4], [2, 2, 2.1, 4], [3.9, 2, 4, 4]], dtype=float)
+    listeners = np.array([[3.0, 3.0, 1.5], [1.0, 5.0, 1.5]])
+    first = render_first_arrivals(box, np.array([0.0, 0.0, 1.0]), listeners, DIFFRACTION)
+    assert first.scale[0] == 0
+    assert not first.samples[0].any()
+    assert first.scale[1] > 0
+
+
+def test_level_falls_with_the_way_to_walk() -> None:
+    """In `diffraction`, over three rooms: first arrival and reverberation together."""
+    plan = three_rooms()
+    grid = build_grid(plan)
+    source_cell = int(np.flatnonzero((grid.lattice == [2, 8]).all(axis=1))[0])
+    ears = np.column_stack([grid.centres, np.full(len(grid.centres), 1.5)])
+    source = np.array([1.0, 4.0, 1.0])
+    config = AcousticsConfig(
+        name="diffraction", first_arrival="round_corners", rays=3000, seconds=0.3
+    )
+    tail = render_source(build_surfaces(plan), source, ears, config)
+    whole = combine(tail, render_first_arrivals(walls(plan), source, ears, config))
+    level = 10 * np.log10((whole**2).sum(axis=(1, 2, 3)))
+    way = grid.distances[source_cell]
+    assert spearmanr(level, way).statistic < -0.9
+    rooms = [
+        level[(grid.centres[:, 0] > x) & (grid.centres[:, 0] < x + 3)].mean() for x in (0, 3, 6)
+    ]
+    assert rooms[0] > rooms[1] + 3 > rooms[2] + 6
+
+
+def test_an_unknown_regime_is_named() -> None:
+    with pytest.raises(UserError, match=r"acoustics.first_arrival: 'teleport'.*round_corners"):
+        find_paths("teleport", NO_WALLS, EAR[0], EAR)
