@@ -49,7 +49,8 @@ def test_a_key_that_no_schema_declares_is_refused_even_behind_a_plus():
     ],
 )
 def test_a_mistake_is_one_line_that_names_it_and_exit_code_2(command, tmp_path, arguments, said):
-    code, _, err = command("eval", "agent=random_walk", "split=mini", f"outputs={tmp_path}/o", *arguments)
+    given = ("agent=random_walk", "split=mini", f"outputs={tmp_path}/o", *arguments)
+    code, _, err = command("eval", *given)
     lines = [line for line in err if line.strip()]
     assert code == 2, err
     assert len(lines) == 1
@@ -76,11 +77,7 @@ def test_broken_yaml_is_one_line(command, tmp_path):
 
 
 def test_the_cause_is_found_behind_what_others_raised():
-    try:
-        try:
-            raise UserError("file: broken; mend it")
-        except UserError as error:
-            raise RuntimeError("outer\nlines") from error
-    except RuntimeError as error:
-        assert cli.explain(error) == "file: broken; mend it"
+    error = RuntimeError("outer\nlines")
+    error.__cause__ = UserError("file: broken; mend it")
+    assert cli.explain(error) == "file: broken; mend it"
     assert cli.explain(RuntimeError("a bug")) is None

@@ -24,9 +24,14 @@ def test_what_is_missing_is_refused_where_it_must_not_be_made(tmp_path):
 
 def test_a_file_is_there_whole_or_not_at_all(tmp_path):
     path = tmp_path / "file"
-    with pytest.raises(RuntimeError), written_whole(path) as part:
-        part.write_text("half")
-        raise RuntimeError
+
+    def break_off():
+        with written_whole(path) as part:
+            part.write_text("half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        break_off()
     assert list(tmp_path.iterdir()) == []
     with written_whole(path) as part:
         part.write_text("whole")

@@ -1,0 +1,142 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from hydra.errors import InstantiationException
+from hydra.utils import instantiate
+from omegaconf import DictConfig, OmegaConf
+
+from avn.errors import UserError
+from avn.modules.five_layer_cnn import FiveLayerCnn
+from avn.modules.sound_cnn import (
+    ClipBatch,
+    SoundCnn,
+    SoundModelConfig,
+    no_sound_model,
+)
+
+CONF = Path(__file__).parents[2] / "conf" / "sound_model"
+
+
+def config(option: str = "cnn5", **changes: Any) -> DictConfig:
+    node = OmegaConf.load(CONF / f"{option}.yaml")
+    assert isinstance(node, DictConfig)
+    assert node.pop("defaults") == ["schema", "_self_"]
+    merged = OmegaConf.merge(OmegaConf.structured(SoundModelConfig), node)
+    for key, value in changes.items():
+        OmegaConf.update(merged, key.replace("__", "."), value)
+    assert isinstance(merged, DictConfig)
+    return merged
+
+
+@pytest.fixture
+def clips() -> torch.Tensor:
+    return torch.randn(4, 2, 16000, generator=torch.Generator().manual_seed(0)) * 0.1
+
+
+def test_option_names_are_those_of_the_files() -> None:
+    for path in CONF.glob("*.yaml"):
+        assert config(path.stem).name == path.stem
+
+
+def test_none_builds_nothing() -> None:
+    assert instantiate(config("none")) is None
+    assert no_sound_model(epochs=3) is None
+
+
+def test_misspelt_key_is_refused() -> None:
+    with pytest.raises(Exception, match="dropuot"):
+        config(net__dropuot=0.5)
+
+
+def test_default_net_hears_metres(clips: torch.Tensor) -> None:
+    model = instantiate(config()).eval()
+    assert model(clips).shape == (4, 2)
+    assert sum(isinstance(layer, torch.nn.Conv2d) for layer in model.net.modules()) == 5
+
+
+def test_released_sizes() -> None:
+    model = instantiate(config("released"))
+    convolutions = [layer for layer in model.net.modules() if isinstance(layer, torch.nn.Conv2d)]
+    dense = [layer for layer in model.net.modules() if isinstance(layer, torch.nn.Linear)]
+    assert [layer.out_channels for layer in convolutions] == [64, 128, 256, 512, 512]
+    assert {layer.kernel_size for layer in convolutions} == {(3, 3)}
+    assert [layer.out_features for layer in dense] == [4096, 1000, 2]
+    loud = torch.full((2, 2, 128, 128), 1e4)
+    assert model.eval().net(loud).abs().max() <= 10.0
+
+
+@pytest.mark.parametrize("pool", ["stride", "max"])
+def test_odd_pictures_fit(pool: str) -> None:
+    net = FiveLayerCnn(4, 50, 33, widths=(4, 4, 4, 4, 8), hidden=(8,), pool=pool)
+    assert net(torch.zeros(2, 4, 50, 33)).shape == (2, 2)
+
+
+def test_exchanged_ears_mirror_the_location(clips: torch.Tensor) -> None:
+    model = instantiate(config(symmetric=True)).eval()
+    straight, mirrored = model(clips), model(clips.flip(1))
+    torch.testing.assert_close(mirrored, straight * torch.tensor((-1.0, 1.0)), atol=1e-4, rtol=0)
+    assert straight[:, 0].abs().max() > 1e-3
+
+
+def test_a_batch_is_learned(clips: torch.Tensor) -> None:
+    node = config(
+        spectrogram__bands=16, spectrogram__frames=16, net__widths=[8] * 5, net__dropout=0.0
+    )
+    torch.manual_seed(0)
+    model = instantiate(node).train()
+    optimizer = torch.optim.Adam(model.parameters(), 1e-2)
+    target = torch.tensor([[3.0, 1.0], [-2.0, 4.0], [0.5, -3.0], [-1.0, -1.0]])
+    nothing = torch.zeros(4, dtype=torch.int64)
+    batch = ClipBatch(clips=clips, target=target, in_sight=nothing.bool(), sound=nothing)
+    losses = []
+    for _ in range(80):
+        optimizer.zero_grad()
+        loss = model.training_step(batch, 0)
+        loss.backward()
+        optimizer.step()
+        losses.append(float(loss.detach()))
+    assert min(losses[-10:]) < 0.1 * losses[0]
+
+
+def test_train_seed_draws_the_weights() -> None:
+    def first(seed: int) -> torch.Tensor:
+        return next(instantiate(config(train_seed=seed)).net.layers[1].parameters())
+
+    before = torch.get_rng_state()
+    assert torch.equal(first(1), first(1))
+    assert not torch.equal(first(1), first(2))
+    assert torch.equal(before, torch.get_rng_state())
+
+
+def test_hyperparameters_are_plain() -> None:
+    hparams = dict(instantiate(config()).hparams)
+    assert type(hparams["net"]) is dict
+    assert type(hparams["net"]["widths"]) is list
+
+
+def test_every_recipe_key_reaches_the_model() -> None:
+    machinery = {"_target_", "_recursive_", "_convert_"}
+    assert set(instantiate(config()).hparams) == set(config()) - machinery
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"schedule": "linear"}, "sound_model.schedule is 'linear'"),
+        ({"epochs": 0}, "sound_model.epochs is 0"),
+        ({"net__pool": "mean"}, "sound_model.net.pool is 'mean'"),
+        ({"net__pool": "max", "spectrogram__bands": 16}, "16 x 64 is too small for 5 halvings"),
+        ({"spectrogram__frames": 60}, "sound_model.spectrogram.frames is 60"),
+    ],
+)
+def test_bad_option_is_named(changes: dict[str, Any], message: str) -> None:
+    node = config(**changes)
+    recipe = OmegaConf.to_container(node)
+    assert isinstance(recipe, dict)
+    plain = {str(key): value for key, value in recipe.items() if not str(key).startswith("_")}
+    with pytest.raises(UserError, match=message):
+        SoundCnn(**plain)
+    with pytest.raises(InstantiationException, match=message):
+        instantiate(node)

@@ -1,0 +1,156 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from hydra.utils import instantiate
+from lightning.pytorch.callbacks import Callback
+from omegaconf import OmegaConf
+from synthetic_scene import synthetic_scene, synthetic_sounds
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from avn.acoustics.clips import MicrophoneConfig
+from avn.datamodules.sound import SoundData
+from avn.errors import UserError
+from avn.modules.sound_cnn import SoundCnn, SoundModelConfig
+from avn.modules.sound_training import BEST, LAST, fit, load_weights
+
+
+def recipe(**changes: Any) -> SoundModelConfig:
+    config = SoundModelConfig(name="test", epochs=4, batch=16, validation_clips=60)
+    config.optimizer.lr, config.net.dropout = 3e-3, 0.1
+    config.spectrogram.bands = config.spectrogram.frames = 16
+    config.net.widths, config.net.hidden = [8, 8, 8, 8, 8], [16]
+    for key, value in changes.items():
+        setattr(config, key, value)
+    return config
+
+
+def build(**changes: Any) -> tuple[SoundData, SoundCnn]:
+    config = recipe(**changes)
+    scenes = [synthetic_scene("a")], [synthetic_scene("b", 2.5)]
+    data = SoundData(*scenes, "resonance", synthetic_sounds(), MicrophoneConfig(), config)
+    return data, instantiate(OmegaConf.structured(config))
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    folder = tmp_path_factory.mktemp("run")
+    return folder, fit(*build(), folder)
+
+
+def weights(path: Path) -> dict[str, torch.Tensor]:
+    return torch.load(path, weights_only=True)["state_dict"]
+
+
+def test_training_lowers_the_error(run: tuple[Path, dict[str, Any]]) -> None:
+    _, metrics = run
+    data, untrained = build()
+    batches = list(data.val_dataloader()[1])
+    with torch.inference_mode():
+        heard = torch.cat([untrained.eval()(batch["clips"]) for batch in batches])
+    target = torch.cat([batch["target"] for batch in batches])
+    before = torch.nn.functional.mse_loss(heard, target)
+    assert metrics["loss/training"] < float(before)
+    assert metrics["epochs"] == 4
+
+
+def test_metrics_are_by_split_sight_and_sound(run: tuple[Path, dict[str, Any]]) -> None:
+    _, metrics = run
+    for split in ("validation", "training"):
+        for sight in ("in_sight", "out_of_sight", "all"):
+            for sound in ("hiss", "hum", "all"):
+                assert metrics[f"error_m/{split}/{sight}/{sound}"] > 0
+                assert 0 <= metrics[f"bearing_deg/{split}/{sight}/{sound}"] <= 180
+
+
+def test_tensorboard_holds_scalars_figures_and_audio(run: tuple[Path, dict[str, Any]]) -> None:
+    folder, metrics = run
+    events = EventAccumulator(str(folder), size_guidance={"images": 0, "audio": 0}).Reload()
+    tags = events.Tags()
+    wanted = {name for name in metrics if "/" in name} | {"loss/steps"}
+    assert wanted <= set(tags["scalars"])
+    assert {"locations/hiss", "spectrogram/hum/in_sight"} <= set(tags["images"])
+    assert {"audio/hiss/in_sight", "audio/hiss/out_of_sight"} <= set(tags["audio"])
+    series = [event.value for event in events.Scalars("error_m/validation/all/all")]
+    assert len(series) == 4
+    assert min(series) == pytest.approx(metrics["error_m/validation/all/all"])
+
+
+class _InterruptedError(Exception):
+    pass
+
+
+class _StopIn(Callback):
+    """Kills a training in the middle of an epoch."""
+
+    def __init__(self, epoch: int) -> None:
+        self.epoch = epoch
+
+    def on_train_batch_start(self, trainer: Any, pl_module: Any, batch: Any, index: int) -> None:
+        if trainer.current_epoch == self.epoch and index == 1:
+            raise _InterruptedError
+
+
+def test_resumed_training_is_the_uninterrupted_one(
+    run: tuple[Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    folder, metrics = run
+    data, model = build()
+    model.configure_callbacks = lambda: [_StopIn(3)]
+    with pytest.raises(_InterruptedError):
+        fit(data, model, tmp_path)
+    assert torch.load(tmp_path / LAST, weights_only=True)["epoch"] == 2
+    resumed = fit(*build(), tmp_path)
+    assert resumed == metrics
+    for name in (BEST, LAST):
+        first, second = weights(folder / name), weights(tmp_path / name)
+        assert all(torch.equal(first[key], second[key]) for key in first)
+
+
+def test_finished_training_is_not_repeated(run: tuple[Path, dict[str, Any]]) -> None:
+    folder, metrics = run
+    written = (folder / LAST).stat().st_mtime_ns
+    assert fit(*build(), folder) == metrics
+    assert (folder / LAST).stat().st_mtime_ns == written
+
+
+def test_training_stops_early_without_progress(tmp_path: Path) -> None:
+    data, model = build(epochs=5, patience=1)
+    model.hparams["optimizer"]["lr"] = 0.0
+    # With a rate of 0 the weights never change; batch normalisation alone moves the error.
+    assert fit(data, model, tmp_path)["epochs"] < 5
+
+
+def test_best_weights_are_the_model_s_afterwards(run: tuple[Path, dict[str, Any]]) -> None:
+    model = load_weights(build()[1], run[0] / BEST)
+    assert not model.training
+    saved = weights(run[0] / BEST)
+    assert all(torch.equal(saved[key], value) for key, value in model.state_dict().items())
+
+
+def test_checkpoint_of_another_config_is_refused(run: tuple[Path, dict[str, Any]]) -> None:
+    other = build(train_seed=3)
+    message = r"best.ckpt: .*another config \(sound_model.train_seed is 0 there, 3 here\)"
+    with pytest.raises(UserError, match=message):
+        load_weights(other[1], run[0] / BEST)
+    with pytest.raises(UserError, match=r"last.ckpt: .*another config"):
+        fit(*other, run[0])
+
+
+@pytest.mark.parametrize("damage", ["missing", "cut", "text", "other"])
+def test_damaged_checkpoint_is_named(
+    run: tuple[Path, dict[str, Any]], tmp_path: Path, damage: str
+) -> None:
+    path = tmp_path / BEST
+    whole = (run[0] / BEST).read_bytes()
+    if damage == "cut":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif damage == "text":
+        path.write_text("not a checkpoint")
+    elif damage == "other":
+        torch.save({"weights": torch.zeros(3)}, path)
+    with pytest.raises(UserError) as caught:
+        load_weights(build()[1], path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)

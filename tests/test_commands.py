@@ -1,0 +1,224 @@
+"""The commands on the real pipeline, with the mini split and few rays."""
+
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+import soundfile
+import torch
+
+SMALL = (
+    "split=mini",
+    "processes=1",
+    "acoustics.rays=300",
+    "acoustics.seconds=0.2",
+    "sound_model.epochs=1",
+    "takes=1",
+)
+
+
+def run_greedy(command, outputs, *more):
+    return command("eval", "agent=greedy", *SMALL, f"outputs={outputs}", *more)
+
+
+def copy(outputs, tmp_path):
+    return Path(shutil.copytree(outputs, tmp_path / "copy"))
+
+
+def test_greedy_walks_on_sound_that_was_made_on_the_way(command, outputs):
+    code, out, err = run_greedy(command, outputs, "sound=alarm")
+    assert code == 0, err
+    folder = Path(out[-1])
+    episodes = pd.read_csv(folder / "episodes.csv")
+    results = pd.read_csv(folder / "results.csv")
+    assert len(episodes) == 2 * 20
+    assert results["room"].tolist()[-1] == "average"
+    assert results["sr"].iloc[-1] == pytest.approx(episodes["success"].mean())
+    assert results["spl"].iloc[-1] == pytest.approx(episodes["spl"].mean())
+    assert list(folder.glob("events.out.tfevents.*"))
+
+
+def test_a_finished_run_is_reused_and_gives_the_same_bytes_when_made_again(
+    command, outputs, tmp_path
+):
+    _, out, _ = run_greedy(command, outputs, "sound=alarm")
+    assert not any("missing" in line for line in out)
+    first = (Path(out[-1]) / "episodes.csv").read_bytes()
+    again = copy(outputs, tmp_path)
+    shutil.rmtree(again / "eval")
+    shutil.rmtree(again / "hear")
+    _, out, _ = run_greedy(command, again, "sound=alarm")
+    assert (Path(out[-1]) / "episodes.csv").read_bytes() == first
+
+
+def test_a_sweep_ends_with_mean_and_spread_and_takes_overrides_on_both_sides_of_m(command, outputs):
+    code, out, err = command(
+        "eval", "agent=random_walk", "split=mini", "-m", f"outputs={outputs}", "sound=alarm"
+    )
+    assert code == 0, err
+    assert any("3 seeds: SR" in line and "+-" in line for line in out)
+    summary = pd.read_csv(Path(out[-1]) / "results.csv")
+    seeds = [
+        pd.read_csv(file)
+        for file in sorted(outputs.glob("eval/random_walk/alarm/seed*/results.csv"))
+    ]
+    assert len(seeds) == 3
+    rates = [table.loc[table["room"] == "average", "sr"].item() for table in seeds]
+    row = summary[summary["room"] == "average"]
+    assert row["sr"].item() == pytest.approx(np.mean(rates))
+    assert row["sr_std"].item() == pytest.approx(np.std(rates, ddof=1))
+
+
+def test_a_failing_job_is_named_and_the_others_run(command, outputs):
+    code, out, err = command(
+        "eval",
+        "agent=random_walk",
+        "split=mini",
+        f"outputs={outputs}",
+        "-m",
+        "protocol.starts=20,100000",
+        "seed=0",
+    )
+    assert code == 2
+    assert any("failed: " in line and "protocol.starts=100000" in line for line in err)
+    assert "1 of 2 jobs failed" in err[-1]
+    assert any("1 seeds: SR" in line for line in out)
+
+
+def test_any_audio_file_is_a_sound(command, outputs, tmp_path):
+    tone = 0.1 * np.sin(2 * np.pi * 500 * np.arange(4410) / 44100)
+    soundfile.write(tmp_path / "my tone.wav", np.column_stack([tone, tone]), 44100)
+    code, out, err = run_greedy(command, outputs, f"sound={tmp_path / 'my tone.wav'}")
+    assert code == 0, err
+    assert set(pd.read_csv(Path(out[-1]) / "results.csv")["sound"]) == {"my tone"}
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "does not exist"),
+        (b"", "empty"),
+        (b"this is no audio at all, but text" * 9, "not audio"),
+    ],
+)
+def test_a_bad_sound_file_is_one_line(command, outputs, tmp_path, content, said):
+    path = tmp_path / "bad.wav"
+    if content is not None:
+        path.write_bytes(content)
+    code, _, err = run_greedy(command, outputs, f"sound={path}")
+    assert code == 2
+    assert len(err) == 1
+    assert str(path) in err[0]
+    assert said in err[0]
+
+
+def _cut(path):
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def _flip(path):
+    with path.open("r+b") as file:
+        file.seek(path.stat().st_size // 2)
+        byte = file.read(1)[0]
+        file.seek(-1, 1)
+        file.write(bytes([byte ^ 1]))
+
+
+def _other_version(path):
+    with h5py.File(path, "r+") as file:
+        file.attrs["version"] = 77
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [(_cut, "cut short"), (_flip, "changed"), (_other_version, "format version 77")],
+)
+@pytest.mark.parametrize("name", ["geometry.h5", "acoustics-tail.h5", "acoustics-resonance.h5"])
+def test_a_spoilt_scene_file_is_one_line_and_is_left_as_it_is(
+    command, outputs, tmp_path, name, spoil, said
+):
+    mine = copy(outputs, tmp_path)
+    shutil.rmtree(mine / "eval")
+    shutil.rmtree(mine / "hear")
+    (tail,) = mine.glob("generate/mini-*/room_1/acoustics-tail.h5")
+    path = tail.with_name(name)
+    spoil(path)
+    content = path.read_bytes()
+    code, _, err = run_greedy(command, mine, "sound=alarm")
+    assert code == 2
+    lines = [line for line in err if line.startswith("avn.eval")]
+    assert len(lines) == 1
+    assert str(path) in lines[0]
+    assert said in lines[0]
+    assert path.read_bytes() == content
+    assert not list(mine.rglob("results.csv"))
+
+
+def test_a_checkpoint_of_another_config_is_one_line(command, outputs, tmp_path):
+    mine = copy(outputs, tmp_path)
+    (folder,) = (p for p in (mine / "train").iterdir() if p.is_dir())
+    checkpoint = torch.load(folder / "best.ckpt", weights_only=True)
+    checkpoint["hyper_parameters"]["batch"] = 7
+    torch.save(checkpoint, folder / "best.ckpt")
+    shutil.rmtree(mine / "hear")
+    shutil.rmtree(mine / "eval")
+    code, _, err = run_greedy(command, mine, "sound=alarm")
+    assert code == 2
+    assert str(folder / "best.ckpt") in err[-1]
+    assert "sound_model.batch" in err[-1]
+
+
+def test_a_split_without_a_test_apartment_is_one_line(command, outputs):
+    code, _, err = command(
+        "eval", "agent=oracle", "split=mini", "split.test=0", f"outputs={outputs}"
+    )
+    assert code == 2
+    assert len(err) == 1
+    assert "split.test" in err[0]
+
+
+def test_what_is_missing_is_refused_with_auto_false(command, tmp_path):
+    code, _, err = run_greedy(command, tmp_path / "o", "auto=false")
+    assert code == 2
+    assert "auto=false" in err[-1]
+
+
+def test_training_prints_its_figures_and_its_folder(command, outputs):
+    code, out, err = command("train", "model=sound_cnn", *SMALL, f"outputs={outputs}")
+    assert code == 0, err
+    metrics = json.loads((Path(out[-1]) / "metrics.json").read_text())
+    assert any("error_m/validation/in_sight/all" in line for line in out)
+    assert metrics["error_m/validation/in_sight/all"] > 0
+
+
+def test_generate_draws_plans_and_writes_clips(command, outputs):
+    code, out, err = command(
+        "generate", *SMALL, f"outputs={outputs}", "export=wav", "clips=[[0,4],[1,9]]"
+    )
+    assert code == 0, err
+    room = Path(out[-1]) / "room_1"
+    assert (room / "floor_plan.png").read_bytes()[:4] == b"\x89PNG"
+    waves = sorted((room / "wav").glob("*.wav"))
+    assert len(waves) == 2 * 3
+    samples, rate = soundfile.read(waves[0])
+    assert rate == 16000
+    assert samples.shape == (16000, 2)
+    code, _, err = command("generate", *SMALL, f"outputs={outputs}", "export=wav", "clips=[[9,4]]")
+    assert code == 2
+    assert "clips" in err[-1]
+
+
+def test_reproduce_runs_the_rows_that_are_named(command, outputs):
+    code, out, err = command(
+        "reproduce", *SMALL, f"outputs={outputs}", "rows=random_walk,oracle", "seeds=0"
+    )
+    assert code == 0, err
+    results = pd.read_csv(Path(out[-1]) / "results.csv")
+    assert set(results["agent"]) == {"random_walk", "oracle"}
+    best = results[(results["agent"] == "oracle") & (results["room"] == "average")]
+    assert best["sr"].to_numpy() == pytest.approx(1)
+    assert best["spl"].to_numpy() == pytest.approx(1)
