@@ -128,10 +128,8 @@ def _read(
         scale = file["scale"][()]
         dataset = file["samples"]
         if memory_map:
-            # contiguous on purpose: the system reads the pages that are asked for, no more;
-            # the offset that HDF5 gives does not count the header before it
-            offset = dataset.id.get_offset() + file.userblock_size
-            shape = dataset.shape
+            # contiguous on purpose: the system reads the pages that are asked for, no more
+            offset, shape = dataset.id.get_offset(), dataset.shape
             return np.memmap(path, np.int16, "r", offset, shape), scale, marks
         return dataset[()], scale, marks
 
