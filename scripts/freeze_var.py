@@ -22,7 +22,7 @@ from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
 from avn.apartments.hardness import Hardness, hardness
 from avn.apartments.splits import FROZEN
-from avn.apartments.symmetry import layout_key
+from avn.apartments.symmetry import layout_key, likeness
 from avn.reporting.floor_plan_figure import save_floor_plan
 
 TRAIN_CELLS, TEST_CELLS = 330, 602
@@ -30,6 +30,8 @@ SUCCESS, SPL = 0.071, 0.043
 # Success of the uniform walk that an apartment of the test may have.
 BAND = (0.060, 0.086)
 TRAIN_SEEDS, TEST_SEEDS = 80, 400
+# No two apartments may look more alike than this.
+ALIKE = 0.65
 # Apartments that passed every check and that nobody would rent, found by looking.
 DISLIKED: dict[str, tuple[int, ...]] = {"airy": (), "roomy": ()}
 
@@ -66,11 +68,21 @@ def candidates(size: str, seeds: int, sources: int, band: tuple[float, float]) -
 
 
 def choose_training(pool: list[Candidate]) -> list[Candidate]:
-    """The two that add up to 330 cells and are nearest in size to one another."""
-    pairs = [p for p in combinations(pool, 2) if p[0].cells + p[1].cells == TRAIN_CELLS]
+    """Of the pairs that add up to 330 cells the two that look least alike."""
+    pairs = [(a, b) for a, b in combinations(pool, 2) if a.cells + b.cells == TRAIN_CELLS]
     if not pairs:
         raise SystemExit(f"no pair of {len(pool)} apartments has {TRAIN_CELLS} cells")
-    return list(min(pairs, key=lambda p: (abs(p[0].cells - p[1].cells), p[0].seed, p[1].seed)))
+    first, second = min(pairs, key=lambda p: (likeness(p[0].plan, p[1].plan), p[0].seed, p[1].seed))
+    return [first, second]
+
+
+def unlike(pool: list[Candidate], others: list[Candidate]) -> list[Candidate]:
+    """Those of the pool that look like none of the others, nor like one before them."""
+    kept: list[Candidate] = []
+    for candidate in pool:
+        if all(likeness(candidate.plan, c.plan) <= ALIKE for c in others + kept):
+            kept.append(candidate)
+    return kept
 
 
 def choose_test(pool: list[Candidate]) -> list[Candidate]:
@@ -101,6 +113,7 @@ def main() -> None:
     # Nearest to the mean size first, as many as can be searched through.
     pool.sort(key=lambda c: (abs(c.cells - TEST_CELLS / 5), c.seed))
     print(f"{len(pool)} apartments may be in the test")
+    pool = unlike(pool[:120], training)
     test = choose_test(pool[:32])
     spare = [c for c in pool if c not in test and 110 <= c.cells <= 130]
     spare.sort(key=lambda c: (abs(c.hardness.success - SUCCESS), c.seed))

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from PIL import Image
 
-from avn.apartments.floor_plan import DOOR_WIDTH, WALL_THICKNESS, FloorPlan, Piece
+from avn.apartments.floor_plan import DOOR_WIDTH, WALL_THICKNESS, Doorway, FloorPlan, Piece, Window
 from avn.apartments.grid import Grid, build_grid, source_cells
 from avn.apartments.surfaces import walls
 
@@ -82,6 +82,7 @@ def draw_floor_plan(axes: Axes, plan: FloorPlan, grid: Grid | None = None) -> No
 
 
 def _draw_openings(axes: Axes, plan: FloorPlan) -> None:
+    openings: list[tuple[Doorway | Window, float, str, int]]
     openings = [(d, DOOR_WIDTH, "#ffffff", 2) for d in plan.doorways]
     openings += [(w, w.width, "#6fb7dd", 4) for w in plan.windows]
     for opening, width, colour, layer in openings:

@@ -1,0 +1,158 @@
+"""From a seed to an apartment that one could live in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from avn.apartments import furniture
+from avn.apartments.floor_plan import WALL_THICKNESS, FloorPlan, Lamp, Piece
+from avn.apartments.furniture import Part
+from avn.apartments.grid import build_grid
+from avn.apartments.layout import draw_layout, outer_spans
+from avn.apartments.placement import DOOR_CLEARANCE, Furnisher, Spot, overlap
+from avn.apartments.rooms import FURNISH
+from avn.apartments.sources import spread_sources
+from avn.errors import UserError
+
+LAMP_HEIGHT = 2.35
+# Draws of rooms before a seed is given up; one in some fifty is a home.
+_DRAWS = 200_000
+_REFITS = 3
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large and how full apartments are.
+
+    Attributes
+    ----------
+    choices : tuple of (int, int, int)
+        Rooms, fewest and most grid squares; one is drawn.
+    richness : (float, float)
+        How much furniture, from 0 (what one cannot do without) to 1.
+    """
+
+    choices: tuple[tuple[int, int, int], ...]
+    richness: tuple[float, float] = (0.0, 1.0)
+
+
+SIZES = {
+    "small": Size(((3, 88, 112),), (0.0, 0.4)),
+    "mixed": Size(((3, 85, 125), (4, 130, 190), (5, 150, 200))),
+    "large": Size(((4, 150, 200), (5, 150, 200))),
+    "roomy": Size(((4, 175, 200), (5, 180, 200)), (0.05, 0.7)),
+    "airy": Size(((4, 196, 200),), (0.0, 0.06)),
+}
+
+
+def generate(seed: int, name: str, sources: int = 5, size: str = "mixed") -> FloorPlan:
+    """Draw an apartment.
+
+    Parameters
+    ----------
+    seed : int
+        The same seed, size and number of sources give the same apartment.
+    name : str
+        What it is called.
+    sources : int
+        Places where a source may stand, spread over the rooms.
+    size : str
+        A key of `SIZES`.
+
+    Returns
+    -------
+    FloorPlan
+
+    Raises
+    ------
+    UserError
+        For an unknown size, fewer than one source, or more than the apartment has room for.
+    """
+    if size not in SIZES:
+        raise UserError(f"split.size is '{size}'; choose one of {', '.join(SIZES)}")
+    if sources < 1:
+        raise UserError(f"split: {sources} sources an apartment; ask for at least 1")
+    rng = np.random.default_rng([seed, 20_240])
+    choices = SIZES[size].choices
+    count, fewest, most = choices[int(rng.integers(len(choices)))]
+    richness = float(rng.uniform(*SIZES[size].richness))
+    for _ in range(_DRAWS):
+        plan = draw_layout(name, count, (fewest, most), rng)
+        plan = _furnish(plan, richness, rng) if plan is not None else None
+        if plan is not None:
+            return _with_sources(plan, sources, rng)
+    raise UserError(f"apartment {name}: no home found for seed {seed}; take another seed")
+
+
+def _furnish(plan: FloorPlan, richness: float, rng: np.random.Generator) -> FloorPlan | None:
+    """Furnish every room and check that the whole can be walked; None where it cannot."""
+    with_table = _room_to_eat_in(plan)
+    pieces: list[Piece] = []
+    bedrooms = [r for r in plan.rooms if r.kind == "bedroom"]
+    main = max(bedrooms, key=lambda r: (r.x1 - r.x0) * (r.y1 - r.y0), default=None)
+    for index, room in enumerate(plan.rooms):
+        for _ in range(_REFITS):
+            furnisher = Furnisher(plan, room, rng)
+            entered = index != _hub(plan) or _front_door(plan, furnisher)
+            special = room is main if room.kind == "bedroom" else index == with_table
+            if entered and FURNISH[room.kind](furnisher, richness, special):
+                break
+        else:
+            return None
+        pieces += furnisher.pieces
+    lamps = tuple(Lamp((r.x0 + r.x1) / 2, (r.y0 + r.y1) / 2, LAMP_HEIGHT) for r in plan.rooms)
+    plan = replace(plan, furniture=tuple(pieces), lamps=lamps)
+    try:
+        build_grid(plan)
+    except UserError:
+        return None
+    return plan
+
+
+def _hub(plan: FloorPlan) -> int:
+    """The room that one comes home to."""
+    kinds = [room.kind for room in plan.rooms]
+    return kinds.index("living_room" if "living_room" in kinds else "kitchen")
+
+
+def _room_to_eat_in(plan: FloorPlan) -> int:
+    """The kitchen if a table and chairs go into it, else the living room."""
+    kinds = [room.kind for room in plan.rooms]
+    kitchen = plan.rooms[kinds.index("kitchen")]
+    wide = min(kitchen.x1 - kitchen.x0, kitchen.y1 - kitchen.y0) >= 3.0
+    return kinds.index("kitchen" if wide or "living_room" not in kinds else "living_room")
+
+
+def _front_door(plan: FloorPlan, furnisher: Furnisher) -> bool:
+    """Hang the front door into an outer wall of the room, and keep the floor before it free."""
+    x0, y0, x1, y1 = furnisher.floor
+    room = plan.rooms[_hub(plan)]
+    door = Part(furniture.FRONT_DOOR, 0.0, furniture.FRONT_DOOR.depth / 2)
+    half, thick = furniture.FRONT_DOOR.width / 2, WALL_THICKNESS / 2
+    reach = furniture.FRONT_DOOR.depth + DOOR_CLEARANCE
+    spots = []
+    for along, line, low, high in outer_spans(room, plan.rooms):
+        for at in (low + thick + half + 0.1, high - thick - half - 0.1):
+            if along == "x":
+                inner, heading = (y0, 0) if line < (y0 + y1) / 2 else (y1, 2)
+                spot = Spot(at, inner, heading, 0.0)
+            else:
+                inner, heading = (x0, 1) if line < (x0 + x1) / 2 else (x1, 3)
+                spot = Spot(inner, at, heading, 0.0)
+            before = spot.place((-half, 0.0, half, reach))
+            clash = any(overlap(before, zone) for zone in furnisher.zones)
+            if high - low > 1.2 and not clash and not furnisher.before_window(before):
+                spots.append((spot, before))
+    if not spots:
+        return False
+    spot, before = spots[int(furnisher.rng.integers(len(spots)))]
+    furnisher.pieces.append(spot.piece(door))
+    furnisher.zones.append(spot.place((-half, furniture.FRONT_DOOR.depth, half, reach)))
+    return True
+
+
+def _with_sources(plan: FloorPlan, count: int, rng: np.random.Generator) -> FloorPlan:
+    grid = build_grid(plan)
+    return replace(plan, sources=tuple(spread_sources(plan, grid, count, rng)))

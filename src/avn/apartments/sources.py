@@ -1,0 +1,86 @@
+"""Where sources stand."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avn.apartments.floor_plan import FloorPlan
+from avn.apartments.grid import Grid, goal_cells
+from avn.errors import UserError
+
+# Nearest that two sources stand, metres, where there is room for it.
+APART = 1.5
+# Cells of the nine around a source, itself among them, that can be walked to at once.
+_OPEN = 8
+
+
+def spread_sources(
+    plan: FloorPlan, grid: Grid, count: int, rng: np.random.Generator
+) -> list[tuple[float, float]]:
+    """Choose cells for sources: in every room if there are enough, far from one another.
+
+    They stand on open floor, most of the 3 x 3 cells around them free, so that an apartment
+    is hard for its walls and not for a nook that its source hides in. Cells in a doorway, or
+    right before one, are left out.
+
+    Returns
+    -------
+    list of (x, y)
+        Centres of `count` free cells, metres, from room to room.
+
+    Raises
+    ------
+    UserError
+        Where the apartment has fewer such cells than `count`.
+    """
+    doors = np.array([(d.x, d.y) for d in plan.doorways]).reshape(-1, 2)
+    away = np.abs(grid.centres[:, None] - doors[None]).max(axis=2, initial=0) > 0.6
+    eligible = np.flatnonzero(away.all(axis=1))
+    if len(eligible) < count:
+        raise UserError(
+            f"apartment {plan.name}: {count} sources asked for, room for {len(eligible)}; "
+            "ask for fewer"
+        )
+    openness = goal_cells(grid).sum(axis=1)
+    chosen: list[int] = []
+    for room in _rooms_for_sources(plan, grid.rooms[eligible], count):
+        cells = eligible[grid.rooms[eligible] == room]
+        cells = cells[~np.isin(cells, chosen)]
+        chosen.append(_choose(cells, chosen, grid, openness, rng))
+    return [(float(x), float(y)) for x, y in grid.centres[sorted(chosen)]]
+
+
+def _rooms_for_sources(plan: FloorPlan, rooms: NDArray[np.int16], count: int) -> list[int]:
+    """The room of each source: one for every room first, then by how many cells it has.
+
+    A bathroom is left out of the first round unless there are two sources a room.
+    """
+    cells = np.bincount(rooms, minlength=len(plan.rooms))
+    small = np.array([room.kind == "bathroom" for room in plan.rooms])
+    first = (cells > 0) & (~small | (count >= 2 * len(plan.rooms)))
+    given = np.zeros(len(cells), dtype=int)
+    for _ in range(count):
+        # The room with most cells a source, that still has a cell to give.
+        share = np.where(given < cells, cells / (given + 1), -1.0)
+        waiting = first & (given == 0)
+        given[int(np.where(waiting, share, share * ~waiting.any()).argmax())] += 1
+    return [room for room, n in enumerate(given) for _ in range(n)]
+
+
+def _choose(
+    cells: NDArray[np.int64],
+    chosen: list[int],
+    grid: Grid,
+    openness: NDArray[np.int64],
+    rng: np.random.Generator,
+) -> int:
+    """A random cell that is far enough from what is chosen and stands open, if there is one."""
+    nearest = np.full(len(cells), np.inf)
+    if chosen:
+        apart = np.linalg.norm(grid.centres[cells][:, None] - grid.centres[chosen][None], axis=2)
+        nearest = apart.min(axis=1)
+    far = nearest >= APART if (nearest >= APART).any() else nearest == nearest.max()
+    cells = cells[far]
+    wanted = min(_OPEN, openness[cells].max())
+    return int(rng.choice(cells[openness[cells] >= wanted]))

@@ -1,0 +1,119 @@
+"""Which apartments train, validate and test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from avn.apartments.floor_plan import FloorPlan, load
+from avn.apartments.generator import SIZES, generate
+from avn.apartments.symmetry import layout_key
+from avn.errors import UserError
+
+PARTS = ("train", "validation", "test")
+FROZEN = Path(__file__).parents[1] / "assets" / "floor_plans"
+# Seeds looked through for one apartment before its likes are said to be exhausted.
+_LOOK = 200
+
+
+@dataclass
+class SplitConfig:
+    """The config group `split`.
+
+    Attributes
+    ----------
+    name : str
+    folder : str, optional
+        Frozen floor plans: a folder under the package's `assets/floor_plans`, or any folder.
+        Files `train_*.json`, `val_*.json`; all others are test apartments.
+    seed : int
+        First seed of the generator, where there is no folder.
+    size : str
+        Size of generated apartments, a key of `avn.apartments.generator.SIZES`.
+    train, validation, test : int
+        How many apartments are generated. With a folder they are not looked at.
+    train_sources, sources : int
+        Source cells of each training apartment, and of each other.
+    """
+
+    name: str = "var"
+    folder: str | None = None
+    seed: int = 0
+    size: str = "mixed"
+    train: int = 2
+    validation: int = 3
+    test: int = 5
+    train_sources: int = 10
+    sources: int = 5
+
+
+def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
+    """Read or generate the apartments of a split.
+
+    Parameters
+    ----------
+    cfg : SplitConfig
+
+    Returns
+    -------
+    dict of list of FloorPlan
+        Under `train`, `validation` and `test`; each part has at least one apartment. No layout
+        occurs twice, turned or mirrored ones included, among generated apartments.
+
+    Raises
+    ------
+    UserError
+        Where a part is empty, a file or folder is missing or broken, or a number is wrong.
+    """
+    if cfg.folder is not None:
+        split = _frozen(cfg, cfg.folder)
+        for part in PARTS:
+            if not split[part]:
+                raise UserError(
+                    f"split.{part} is empty: no floor plan of that part in {cfg.folder}; "
+                    "add one (train_*.json, val_*.json, any other name for test)"
+                )
+        return split
+    return _generated(cfg)
+
+
+def _frozen(cfg: SplitConfig, where: str) -> dict[str, list[FloorPlan]]:
+    folder = FROZEN / where
+    folder = folder if folder.is_dir() else Path(where).expanduser()
+    if not folder.is_dir():
+        raise UserError(f"split.folder: there is no folder {where}; give one with floor plans")
+    split: dict[str, list[FloorPlan]] = {part: [] for part in PARTS}
+    for path in sorted(folder.glob("*.json")):
+        plan = load(path)
+        if plan.name != path.stem:
+            raise UserError(f"{path}: the plan is named '{plan.name}'; name it like its file")
+        part = {"train": "train", "val": "validation"}.get(path.stem.split("_")[0], "test")
+        split[part].append(plan)
+    return split
+
+
+def _generated(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
+    if cfg.size not in SIZES:
+        raise UserError(f"split.size is '{cfg.size}'; choose one of {', '.join(SIZES)}")
+    for key in ("train", "validation", "test", "train_sources", "sources"):
+        if getattr(cfg, key) < 1:
+            raise UserError(f"split.{key} is {getattr(cfg, key)}; give at least 1")
+    if cfg.seed < 0:
+        raise UserError(f"split.seed is {cfg.seed}; give 0 or more")
+    seen = set()
+    seed = cfg.seed
+    split: dict[str, list[FloorPlan]] = {part: [] for part in PARTS}
+    names = {"train": "train", "validation": "val", "test": "room"}
+    for part in PARTS:
+        sources = cfg.train_sources if part == "train" else cfg.sources
+        for number in range(1, getattr(cfg, part) + 1):
+            for _ in range(_LOOK):
+                plan = generate(seed, f"{names[part]}_{number}", sources, cfg.size)
+                seed += 1
+                if layout_key(plan) not in seen:
+                    break
+            else:
+                raise UserError(f"split.{part}: no new layout of size {cfg.size}; ask for fewer")
+            seen.add(layout_key(plan))
+            split[part].append(plan)
+    return split

@@ -1,0 +1,223 @@
+"""Surfaces: the axis-aligned rectangles that sound and light meet.
+
+The air of an apartment is a union of boxes: one a room and one a doorway. What bounds that
+union, less openings and plus furniture, is what is listed here, so that no ray finds a gap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avn.apartments.floor_plan import (
+    CEILING,
+    DOOR_HEIGHT,
+    DOOR_WIDTH,
+    WALL_THICKNESS,
+    Doorway,
+    FloorPlan,
+    Piece,
+    Room,
+    Window,
+)
+from avn.apartments.sight import line_of_sight
+from avn.apartments.walls import walls
+
+__all__ = ["Surfaces", "build_surfaces", "line_of_sight", "shoebox", "walls"]
+
+Rect = tuple[float, float, float, float]
+# Axis of the normal, offset on it, bounds on the two other axes, material, piece.
+Quad = tuple[int, float, Rect, str, int]
+
+DOOR_FRAME = "wood"
+PANE = "glass"
+BUILDING = -1
+_SLIVER = 1e-6
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Q axis-aligned rectangles.
+
+    Attributes
+    ----------
+    axis : (Q,) int8
+        The axis of the normal: 0 x, 1 y, 2 z.
+    offset : (Q,) float64
+        Where the rectangle lies on that axis, metres.
+    lower, upper : (Q, 2) float64
+        Its bounds on the two other axes in ascending order of axis, metres.
+    material : (Q,) int16
+        Index into `materials`.
+    piece : (Q,) int16
+        Index of the piece of furniture it belongs to; -1 for the building.
+    materials : tuple of str
+        Names known to `avn.acoustics.materials`.
+    """
+
+    axis: NDArray[np.int8]
+    offset: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    material: NDArray[np.int16]
+    piece: NDArray[np.int16]
+    materials: tuple[str, ...]
+
+
+def _subtract(rect: Rect, hole: Rect) -> list[Rect]:
+    """What is left of a rectangle (low, low, high, high) without a hole: at most four."""
+    a0, b0, a1, b1 = rect
+    h0, i0, h1, i1 = max(a0, hole[0]), max(b0, hole[1]), min(a1, hole[2]), min(b1, hole[3])
+    if h1 - h0 < _SLIVER or i1 - i0 < _SLIVER:
+        return [rect]
+    parts = [(a0, b0, h0, b1), (h1, b0, a1, b1), (h0, b0, h1, i0), (h0, i1, h1, b1)]
+    return [(p, q, r, s) for p, q, r, s in parts if r - p > _SLIVER and s - q > _SLIVER]
+
+
+def _subtract_all(rects: list[Rect], holes: list[Rect]) -> list[Rect]:
+    for hole in holes:
+        rects = [part for rect in rects for part in _subtract(rect, hole)]
+    return rects
+
+
+def _interior(room: Room) -> Rect:
+    half = WALL_THICKNESS / 2
+    return room.x0 + half, room.y0 + half, room.x1 - half, room.y1 - half
+
+
+def _hole(opening: Doorway | Window, wall: tuple[str, float]) -> Rect | None:
+    """The part of a wall (axis it runs along, its line) that an opening takes: along, height."""
+    across, centre = (opening.y, opening.x) if opening.along == "x" else (opening.x, opening.y)
+    if opening.along != wall[0] or abs(across - wall[1]) > _SLIVER:
+        return None
+    if isinstance(opening, Doorway):
+        return centre - DOOR_WIDTH / 2, 0.0, centre + DOOR_WIDTH / 2, DOOR_HEIGHT
+    half = opening.width / 2
+    return centre - half, opening.sill, centre + half, opening.sill + opening.height
+
+
+def _room_quads(room: Room, plan: FloorPlan) -> list[Quad]:
+    x0, y0, x1, y1 = inside = _interior(room)
+    quads: list[Quad] = [
+        (2, 0.0, inside, room.floor, BUILDING),
+        (2, CEILING, inside, room.ceiling, BUILDING),
+    ]
+    # Normal, offset of the face, the wall's own line, and the span of the face.
+    faces = (
+        (0, x0, ("y", room.x0), (y0, y1)),
+        (0, x1, ("y", room.x1), (y0, y1)),
+        (1, y0, ("x", room.y0), (x0, x1)),
+        (1, y1, ("x", room.y1), (x0, x1)),
+    )
+    for axis, offset, wall, (low, high) in faces:
+        face = (low, 0.0, high, CEILING)
+        doors = [hole for d in plan.doorways if (hole := _hole(d, wall)) is not None]
+        panes = [hole for w in plan.windows if (hole := _hole(w, wall)) is not None]
+        panes = [(max(a, low), b, min(c, high), d) for a, b, c, d in panes if c > low and a < high]
+        for rect in _subtract_all([face], doors + panes):
+            quads.append((axis, offset, rect, room.walls, BUILDING))
+        quads += [(axis, offset, pane, PANE, BUILDING) for pane in panes]
+    return quads
+
+
+def _doorway_quads(door: Doorway, plan: FloorPlan) -> list[Quad]:
+    """The two jambs, the lintel and the threshold of a doorway."""
+    half, thick = DOOR_WIDTH / 2, WALL_THICKNESS / 2
+    jamb_axis = 0 if door.along == "x" else 1
+    centre, line = (door.x, door.y) if door.along == "x" else (door.y, door.x)
+    jamb = (line - thick, 0.0, line + thick, DOOR_HEIGHT)
+    low, high = centre - half, centre + half
+    flat = (low, line - thick, high, line + thick)
+    if door.along == "y":
+        flat = (flat[1], flat[0], flat[3], flat[2])
+    floor = next(
+        r.floor
+        for r in plan.rooms
+        if r.x0 - _SLIVER <= door.x <= r.x1 + _SLIVER and r.y0 - _SLIVER <= door.y <= r.y1 + _SLIVER
+    )
+    return [
+        (jamb_axis, low, jamb, DOOR_FRAME, BUILDING),
+        (jamb_axis, high, jamb, DOOR_FRAME, BUILDING),
+        (2, DOOR_HEIGHT, flat, DOOR_FRAME, BUILDING),
+        (2, 0.0, flat, floor, BUILDING),
+    ]
+
+
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+
+def _box(piece: Piece) -> Box:
+    x0, y0, x1, y1 = piece.bounds
+    return (x0, y0, piece.z), (x1, y1, piece.z + piece.height)
+
+
+def _others(axis: int) -> tuple[int, int]:
+    return (1, 2) if axis == 0 else (0, 2) if axis == 1 else (0, 1)
+
+
+def _side(box: Box, axis: int) -> Rect:
+    a, b = _others(axis)
+    return box[0][a], box[0][b], box[1][a], box[1][b]
+
+
+def _furniture_quads(plan: FloorPlan) -> list[Quad]:
+    """The faces of all pieces, less what leans on a wall, the floor or another piece."""
+    boxes = [_box(piece) for piece in plan.furniture]
+    rooms: list[Box] = []
+    for x0, y0, x1, y1 in map(_interior, plan.rooms):
+        rooms.append(((x0, y0, 0.0), (x1, y1, CEILING)))
+    quads: list[Quad] = []
+    for index, (piece, box) in enumerate(zip(plan.furniture, boxes, strict=True)):
+        for axis in range(3):
+            for end in (0, 1):
+                offset, face = box[end][axis], _side(box, axis)
+                # Another piece hides the face where it begins in the plane in which this one
+                # ends; a room's own wall, where both end.
+                covers = [_side(o, axis) for o in boxes if abs(o[1 - end][axis] - offset) < _SLIVER]
+                covers += [_side(r, axis) for r in rooms if abs(r[end][axis] - offset) < _SLIVER]
+                quads += [
+                    (axis, offset, rect, piece.material, index)
+                    for rect in _subtract_all([face], covers)
+                ]
+    return quads
+
+
+def _pack(quads: list[Quad]) -> Surfaces:
+    materials = tuple(sorted({quad[3] for quad in quads}))
+    # Rounded, so that edges that meet are the same number.
+    rects = np.array([quad[2] for quad in quads], dtype=np.float64).reshape(-1, 4).round(6)
+    return Surfaces(
+        axis=np.array([quad[0] for quad in quads], dtype=np.int8),
+        offset=np.array([quad[1] for quad in quads], dtype=np.float64).round(6),
+        lower=np.ascontiguousarray(rects[:, :2]),
+        upper=np.ascontiguousarray(rects[:, 2:]),
+        material=np.array([materials.index(quad[3]) for quad in quads], dtype=np.int16),
+        piece=np.array([quad[4] for quad in quads], dtype=np.int16),
+        materials=materials,
+    )
+
+
+def build_surfaces(plan: FloorPlan) -> Surfaces:
+    """All surfaces that can be met from inside an apartment.
+
+    Both faces of an inner wall carry the material of the room they face; doorways have jambs,
+    a lintel at 2.05 m and a threshold; windows are panes in the wall's inner face; furniture
+    is boxes. The outside of the building is left out.
+    """
+    quads = [quad for room in plan.rooms for quad in _room_quads(room, plan)]
+    quads += [quad for door in plan.doorways for quad in _doorway_quads(door, plan)]
+    return _pack(quads + _furniture_quads(plan))
+
+
+def shoebox(size: tuple[float, float, float], material: str) -> Surfaces:
+    """The six inner faces of a box from the origin to `size` (x, y, z in metres)."""
+    box: Box = ((0.0, 0.0, 0.0), size)
+    return _pack(
+        [
+            (axis, box[end][axis], _side(box, axis), material, BUILDING)
+            for axis in range(3)
+            for end in (0, 1)
+        ]
+    )
