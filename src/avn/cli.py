@@ -150,9 +150,8 @@ def check_keys(cfg: DictConfig, path: str = "") -> None:
             if key not in known:
                 raise UserError(f"{path}{key}: no such key; there are {', '.join(known)}")
     for key in map(str, cfg):
-        if not OmegaConf.is_missing(cfg, key) and isinstance(node := cfg._get_node(key), DictConfig):
-            if node._is_none():
-                continue
+        node = None if OmegaConf.is_missing(cfg, key) else cfg[key]
+        if isinstance(node, DictConfig):
             check_keys(node, f"{path}{key}.")
 
 

@@ -20,7 +20,6 @@ from avn.modules.sound_cnn import SoundModelConfig
 from avn.navigation.protocols import ProtocolConfig
 
 
-
 @dataclass
 class NameConfig:
     """A node that only names something."""

@@ -23,9 +23,9 @@ from avn.acoustics.clips import DrySounds, MicrophoneConfig
 from avn.acoustics.dry_sounds import BUILTIN, content_hash, load_sounds
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.splits import SplitConfig, load_split
+from avn.datamodules.sound import SoundData
 from avn.dataset import build, scene_file
 from avn.dataset.scene import Scene
-from avn.datamodules.sound import SoundData
 from avn.errors import UserError
 from avn.modules import sound_training
 from avn.modules.hearing import hear

@@ -71,4 +71,3 @@ class AudioFilesPath(SearchPathPlugin):
 
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
         search_path.append("avn", "audio://")
-

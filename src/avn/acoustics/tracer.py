@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from avn.acoustics import materials
 from avn.acoustics.kernels import Room, uniform
+from avn.acoustics.population import survey
 from avn.acoustics.rays import Limits, Record, trace_rays
 from avn.acoustics.receivers import sort_listeners
 from avn.apartments.surfaces import Surfaces
@@ -26,6 +27,7 @@ LATE_REACH = 1.5  # how far past `seconds` some rays go on, to measure what is c
 LATE_EVERY = 4  # one ray in so many does
 WEIGHTED_REFLECTIONS = 2
 ENERGY_FLOOR = 1e-8  # a ray that has lost 80 dB in its loudest band ends
+SURVEY = 8  # one ray for so many goes ahead to survey where energy is
 _EVENTS_AT_ONCE = 1 << 18
 
 
@@ -174,12 +176,15 @@ def trace(
     attenuation = materials.air_attenuation() if air else np.zeros(len(materials.BANDS))
     directions = fibonacci_directions(rays, 2 * np.pi * uniform(seed, 0, -1, 0))
     place = np.asarray(source, dtype=np.float64)
+    turn = 2 * np.pi * uniform(seed, 0, -1, 1)
+    few = fibonacci_directions(max(rays // SURVEY, 200), turn)
+    window = survey(few, place, room, limits.late_reach, depth, seed, rays)
     parts: list[tuple[NDArray, ...]] = []
     ray, size = 0, _EVENTS_AT_ONCE
     while ray < rays:
         part = _empty_record(size)
         after, count = trace_rays(
-            ray, directions, place, room, attenuation, spheres, limits, seed, part
+            ray, directions, place, room, attenuation, spheres, window, limits, seed, part
         )
         parts.append(tuple(array[:count].copy() for array in part))
         size = size if after > ray else 2 * size  # one ray alone may fill it

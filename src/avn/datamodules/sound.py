@@ -1,0 +1,268 @@
+"""Clips of the training and validation apartments, rendered batch by batch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import lightning as L
+import torch
+from torch import Tensor
+from torch.utils.data import DataLoader, Dataset, Sampler
+
+from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
+from avn.apartments.floor_plan import CELL
+from avn.dataset.scene import Brirs, Scene
+from avn.errors import UserError
+from avn.modules.sound_cnn import ClipBatch, SoundModelConfig
+
+# The clips on which networks in training are compared; the same for every `train_seed`.
+VALIDATION_SEED = 0
+
+
+def relative_locations(lattice: Tensor, sources: Tensor) -> Tensor:
+    """Where each source lies for each state.
+
+    Parameters
+    ----------
+    lattice : (C, 2) integer tensor
+        Cells, in steps of the grid to the east and to the north.
+    sources : (K,) integer tensor
+        Cells of the sources.
+
+    Returns
+    -------
+    (K, 4 C, 2) float32 tensor
+        Metres to the right and to the front of an agent in state 4 x cell + heading.
+    """
+    east, north = ((lattice[sources][:, None] - lattice[None]) * CELL).float().unbind(-1)
+    right = torch.stack((east, -north, -east, north), -1)
+    front = torch.stack((north, east, -north, -east), -1)
+    return torch.stack((right, front), -1).flatten(1, 2)
+
+
+@dataclass
+class SceneClips:
+    """What is needed of one apartment to render clips and to judge what is heard.
+
+    Attributes
+    ----------
+    brirs : Brirs
+        Impulse responses of the regime.
+    locations : (K, S, 2) float32 tensor
+        Metres right and front.
+    in_sight : (K, S) bool tensor
+    """
+
+    brirs: Brirs
+    locations: Tensor
+    in_sight: Tensor
+
+    @classmethod
+    def of(cls, scene: Scene, regime: str) -> SceneClips:
+        """Open an apartment in one regime."""
+        lattice = torch.from_numpy(scene.grid.lattice.astype("int64"))
+        sources = torch.from_numpy(scene.sources.astype("int64"))
+        in_sight = torch.from_numpy(scene.in_sight).repeat_interleave(4, dim=1)
+        return cls(scene.brirs(regime), relative_locations(lattice, sources), in_sight)
+
+
+class ClipSet(Dataset[ClipBatch]):
+    """The clips of some apartments, each a (take, apartment, source, state, sound).
+
+    An item is one number, `(take x pairs + pair) x sounds + sound`, so that takes never end. A
+    batch is rendered at once by `__getitems__`; a clip is a pure function of its item, of
+    `purpose` and of `seed`.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+    regime : str
+        Which impulse responses.
+    sounds : DrySounds
+    microphone : MicrophoneConfig
+    purpose : {"train", "eval"}
+        Takes of the two purposes have nothing in common.
+    seed : int
+    """
+
+    def __init__(
+        self,
+        scenes: Sequence[Scene],
+        regime: str,
+        sounds: DrySounds,
+        microphone: MicrophoneConfig,
+        purpose: str,
+        seed: int,
+    ) -> None:
+        self.scenes = [SceneClips.of(scene, regime) for scene in scenes]
+        self.sounds = sounds
+        self.renderer = ClipRenderer(sounds, microphone, seed, purpose)
+        shapes = [clips.in_sight.shape for clips in self.scenes]
+        grids = [torch.cartesian_prod(torch.arange(k), torch.arange(s)) for k, s in shapes]
+        self.source, self.state = torch.cat(grids).unbind(1)
+        sizes = torch.tensor([len(grid) for grid in grids])
+        self.apartment = torch.arange(len(grids)).repeat_interleave(sizes)
+        self.target = torch.cat([clips.locations.flatten(0, 1) for clips in self.scenes])
+        self.in_sight = torch.cat([clips.in_sight.flatten() for clips in self.scenes])
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs of source and state there are."""
+        return len(self.source)
+
+    def __len__(self) -> int:
+        return self.pairs * len(self.sounds.names)
+
+    def item(self, pair: Tensor, sound: Tensor, take: int) -> Tensor:
+        """The number of a clip."""
+        return (take * self.pairs + pair) * len(self.sounds.names) + sound
+
+    def __getitem__(self, item: int) -> ClipBatch:
+        return self.__getitems__([item])
+
+    def __getitems__(self, items: Sequence[int]) -> ClipBatch:
+        """Render a batch."""
+        number = torch.as_tensor(items, dtype=torch.int64)
+        sound = number % len(self.sounds.names)
+        pair = number // len(self.sounds.names)
+        take, pair = pair // self.pairs, pair % self.pairs
+        # A pair that is heard with several sounds is transformed once.
+        pair, index = pair.unique(return_inverse=True)
+        spectra = brir_spectra(self._brirs(pair))
+        source, state = self.source[pair][index], self.state[pair][index]
+        return ClipBatch(
+            clips=self.renderer.render(spectra, source, state, sound, take, index),
+            target=self.target[pair][index],
+            in_sight=self.in_sight[pair][index],
+            sound=sound,
+        )
+
+    def _brirs(self, pair: Tensor) -> Tensor:
+        """(N) pairs to (N, 2, T) impulse responses, each gathered from its apartment."""
+        apartment = self.apartment[pair]
+        longest = max(clips.brirs.samples for clips in self.scenes)
+        brirs = torch.zeros(len(pair), 2, longest)
+        for index, clips in enumerate(self.scenes):
+            rows = (apartment == index).nonzero()[:, 0]
+            if len(rows):
+                chosen = pair[rows]
+                gathered = clips.brirs.gather(self.source[chosen], self.state[chosen])
+                brirs[rows, :, : clips.brirs.samples] = gathered
+        return brirs
+
+
+def _as_it_is(batch: Any) -> Any:
+    return batch
+
+
+class FreshTakes(Sampler[int]):
+    """The items of a training epoch in a random order: every pair, each time in another take.
+
+    The order is drawn from the seed and the epoch alone, so that a resumed training sees what
+    an uninterrupted one would have seen.
+
+    Parameters
+    ----------
+    clips : ClipSet
+    seed : int
+    sounds_per_pair : int
+        How many of the sounds a pair is heard with in one epoch.
+    """
+
+    def __init__(self, clips: ClipSet, seed: int, sounds_per_pair: int) -> None:
+        self.clips, self.seed, self.sounds_per_pair = clips, seed, sounds_per_pair
+        self.epoch = 0
+
+    def set_epoch(self, epoch: int) -> None:
+        """Called by the trainer before each epoch."""
+        self.epoch = epoch
+
+    def __len__(self) -> int:
+        return self.clips.pairs * self.sounds_per_pair
+
+    def __iter__(self) -> Iterator[int]:
+        generator = torch.Generator().manual_seed(self.seed * 1_000_003 + self.epoch)
+        sounds = len(self.clips.sounds.names)
+        ranks = torch.rand(self.clips.pairs, sounds, generator=generator).argsort(1)
+        chosen = ranks[:, : self.sounds_per_pair].flatten()
+        pairs = torch.arange(self.clips.pairs).repeat_interleave(self.sounds_per_pair)
+        items = self.clips.item(pairs, chosen, self.epoch)
+        yield from items[torch.randperm(len(items), generator=generator)].tolist()
+
+
+class SoundData(L.LightningDataModule):
+    """What the sound network is trained and validated on; test apartments never enter.
+
+    Parameters
+    ----------
+    train, validation : sequence of Scene
+        Apartments of the two splits.
+    regime : str
+        `resonance` or `diffraction`.
+    sounds : DrySounds
+        Training hears all of them.
+    microphone : MicrophoneConfig
+    recipe : SoundModelConfig
+        Its `batch`, `train_seed`, `sounds_per_pair` and `validation_clips` are used.
+
+    Raises
+    ------
+    UserError
+        Where a split is empty or a number cannot work.
+    """
+
+    def __init__(
+        self,
+        train: Sequence[Scene],
+        validation: Sequence[Scene],
+        regime: str,
+        sounds: DrySounds,
+        microphone: MicrophoneConfig,
+        recipe: SoundModelConfig,
+    ) -> None:
+        super().__init__()
+        if not train or not validation:
+            empty = "validation" if train else "train"
+            raise UserError(f"split.{empty} has no apartment; the sound network needs at least one")
+        if not 1 <= recipe.sounds_per_pair <= len(sounds.names):
+            raise UserError(
+                f"sound_model.sounds_per_pair is {recipe.sounds_per_pair}; "
+                f"give 1 to {len(sounds.names)}, the number of sounds"
+            )
+        if recipe.batch < 1 or recipe.validation_clips < 1:
+            raise UserError("sound_model.batch and sound_model.validation_clips must be 1 or more")
+        self.scenes = {"validation": list(validation), "training": list(train)}
+        self.sounds, self.recipe = sounds, recipe
+        seed = recipe.train_seed
+        self.train_clips = ClipSet(train, regime, sounds, microphone, "train", seed)
+        self.measured_clips = {
+            split: ClipSet(scenes, regime, sounds, microphone, "eval", VALIDATION_SEED)
+            for split, scenes in self.scenes.items()
+        }
+
+    def train_dataloader(self) -> DataLoader[ClipBatch]:
+        """Every pair once an epoch (`sounds_per_pair` times), each time in a fresh take."""
+        sampler = FreshTakes(self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair)
+        return self._loader(self.train_clips, sampler)
+
+    def val_dataloader(self) -> list[DataLoader[ClipBatch]]:
+        """Fixed clips of the validation and of the training apartments, in this order."""
+        loaders = []
+        for clips in self.measured_clips.values():
+            generator = torch.Generator().manual_seed(VALIDATION_SEED)
+            items = torch.randperm(len(clips), generator=generator)[: self.recipe.validation_clips]
+            # In order, so that the impulse responses are read from one end of the file on.
+            loaders.append(self._loader(clips, items.sort().values.tolist()))
+        return loaders
+
+    def _loader(self, clips: ClipSet, sampler: Sampler[int] | list[int]) -> DataLoader[ClipBatch]:
+        # A generator of its own, so that the loader does not draw from the global one.
+        return DataLoader(
+            clips,
+            batch_size=self.recipe.batch,
+            sampler=sampler,
+            collate_fn=_as_it_is,
+            generator=torch.Generator(),
+        )

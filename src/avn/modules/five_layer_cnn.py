@@ -1,0 +1,91 @@
+"""The network behind the sound network: five convolutions, dense layers, a location."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from torch import Tensor, nn
+
+from avn.errors import UserError
+
+
+@dataclass
+class NetConfig:
+    """The sizes of a `FiveLayerCnn`; see there."""
+
+    _target_: str = "avn.modules.five_layer_cnn.FiveLayerCnn"
+    widths: list[int] = field(default_factory=lambda: [16, 32, 64, 128, 128])
+    hidden: list[int] = field(default_factory=lambda: [128])
+    pool: str = "stride"
+    tanh: bool = False
+    dropout: float = 0.25
+    reach: float = 10.0
+
+
+class FiveLayerCnn(nn.Module):
+    """Convolutions of 3 x 3 that each halve the picture, then dense layers to a location.
+
+    Each layer is convolution, ReLU, halving and batch normalisation. Sizes 64-128-256-512-512
+    with max-pooling, dense layers 4096-1000 and tanh are those of the code released with Gan et
+    al., "Look, Listen, and Act" (ICRA 2020).
+
+    Parameters
+    ----------
+    channels, height, width : int
+        Shape of the pictures.
+    widths : sequence of int
+        Channels of each convolution.
+    hidden : sequence of int
+        Sizes of the dense layers before the output.
+    pool : {"stride", "max"}
+        Halving by a convolution of stride 2, or by max-pooling after one of stride 1.
+    tanh : bool
+        Whether tanh bounds the output to +-`reach`.
+    dropout : float
+        Share of inputs of each dense layer that training silences.
+    reach : float
+        Metres for an output of 1.
+    """
+
+    def __init__(
+        self,
+        channels: int,
+        height: int,
+        width: int,
+        widths: Sequence[int] = (16, 32, 64, 128, 128),
+        hidden: Sequence[int] = (128,),
+        pool: str = "stride",
+        tanh: bool = False,
+        dropout: float = 0.25,
+        reach: float = 10.0,
+    ) -> None:
+        super().__init__()
+        if pool not in ("stride", "max"):
+            raise UserError(f"sound_model.net.pool is '{pool}'; give stride or max")
+        if min(height, width) < 2 ** len(widths) and pool == "max":
+            raise UserError(
+                f"sound_model.spectrogram: {height} x {width} is too small for {len(widths)} "
+                "halvings; raise bands and frames"
+            )
+        self.reach = reach
+        layers: list[nn.Module] = [nn.BatchNorm2d(channels)]
+        for before, after in zip((channels, *widths), widths, strict=False):
+            stride = 2 if pool == "stride" else 1
+            layers += [nn.Conv2d(before, after, 3, stride, padding=1), nn.ReLU()]
+            layers += [nn.MaxPool2d(2)] if pool == "max" else []
+            layers += [nn.BatchNorm2d(after)]
+            # A convolution of stride 2 rounds up, max-pooling down.
+            height, width = ((n + 1) // 2 if stride == 2 else n // 2 for n in (height, width))
+        layers.append(nn.Flatten())
+        size = height * width * widths[-1]
+        for wide in hidden:
+            layers += [nn.Dropout(dropout), nn.Linear(size, wide), nn.ReLU()]
+            size = wide
+        layers += [nn.Dropout(dropout), nn.Linear(size, 2)]
+        layers += [nn.Tanh()] if tanh else []
+        self.layers = nn.Sequential(*layers)
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        """(N, channels, height, width) pictures to (N, 2) metres right and front."""
+        return self.layers(pictures) * self.reach

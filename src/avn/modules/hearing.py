@@ -1,0 +1,130 @@
+"""What a sound network makes of every clip of an apartment, once for all walks through it."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import numpy as np
+import pandas as pd
+import torch
+from torch import Tensor
+
+from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
+from avn.datamodules.sound import SceneClips
+from avn.dataset.scene import Scene
+from avn.modules.sound_cnn import SoundCnn
+from avn.modules.sound_metrics import location_errors
+from avn.progress import progress_bar
+
+# Clips rendered at once; more would leave the caches of a CPU.
+BATCH = 96
+
+
+def hear(
+    scene: Scene,
+    regime: str,
+    sounds: DrySounds,
+    model: SoundCnn,
+    takes: int,
+    microphone: MicrophoneConfig,
+    seed: int = 0,
+    progress: bool = True,
+) -> Tensor:
+    """Listen in every state to every source, with every sound, in each evaluation take.
+
+    Parameters
+    ----------
+    scene : Scene
+        An apartment with K sources and S = 4 C states.
+    regime : str
+        Which of its impulse responses.
+    sounds : DrySounds
+    model : SoundCnn
+        Trained; it is set to evaluation.
+    takes : int
+        Takes 0 to `takes` - 1 of the purpose "eval".
+    microphone : MicrophoneConfig
+    seed : int
+        Draws the takes.
+    progress : bool
+        Whether a bar with rate and time left is shown.
+
+    Returns
+    -------
+    (K, S, sounds, takes, 2) float32 tensor
+        Metres right and front.
+    """
+    brirs = scene.brirs(regime)
+    renderer = ClipRenderer(sounds, microphone, seed, "eval")
+    sources, states = len(scene.sources), 4 * len(scene.grid.lattice)
+    source, state = torch.cartesian_prod(torch.arange(sources), torch.arange(states)).unbind(1)
+    each = len(sounds.names) * takes
+    sound, take = torch.cartesian_prod(torch.arange(len(sounds.names)), torch.arange(takes)).T
+    heard = torch.empty(len(source), each, 2)
+    model.eval()
+    what = f"listening in {scene.name}"
+    bar = progress_bar(what, len(source) * each, "clips") if progress else nullcontext(_silent)
+    with torch.inference_mode(), bar as advance:
+        # Whole pairs, so that an impulse response is transformed once for all its clips.
+        for rows in torch.arange(len(source)).split(max(1, BATCH // each)):
+            spectra = brir_spectra(brirs.gather(source[rows], state[rows]))
+            index = torch.arange(len(rows)).repeat_interleave(each)
+            clip = rows[index]
+            repeats = len(rows)
+            clips = renderer.render(
+                spectra,
+                source[clip],
+                state[clip],
+                sound.repeat(repeats),
+                take.repeat(repeats),
+                index,
+            )
+            heard[rows] = model(clips.to(model.device)).cpu().unflatten(0, (repeats, each))
+            advance(len(clip))
+    return heard.reshape(sources, states, len(sounds.names), takes, 2)
+
+
+def _silent(count: int) -> None:
+    """Show no progress."""
+
+
+def sound_errors(scene: Scene, regime: str, heard: Tensor, sounds: DrySounds) -> pd.DataFrame:
+    """Report how far what is heard lies from where the sources are.
+
+    Parameters
+    ----------
+    scene : Scene
+    regime : str
+    heard : (K, S, sounds, takes, 2) float32 tensor
+        As `hear` gives it.
+    sounds : DrySounds
+
+    Returns
+    -------
+    DataFrame
+        A row for each sound, and `all`, in sight, out of sight and in both together. Columns:
+        room, sound, sight, clips, error_m and bearing_deg (medians), front_back (share of clips
+        whose bearing is off by more than 90 degrees).
+    """
+    clips = SceneClips.of(scene, regime)
+    metres, degrees = location_errors(heard, clips.locations[:, :, None, None])
+    in_sight = clips.in_sight[:, :, None, None].expand_as(metres)
+    sight_masks = {"in_sight": in_sight, "out_of_sight": ~in_sight, "all": in_sight | True}
+    rows = []
+    for index, name in enumerate((*sounds.names, "all")):
+        chosen = slice(None) if name == "all" else slice(index, index + 1)
+        for sight, mask in sight_masks.items():
+            picked = mask[:, :, chosen]
+            m, d = metres[:, :, chosen][picked].numpy(), degrees[:, :, chosen][picked].numpy()
+            rows.append(
+                {
+                    "room": scene.name,
+                    "sound": name,
+                    "sight": sight,
+                    "clips": len(m),
+                    "error_m": float(np.median(m)) if len(m) else float("nan"),
+                    "bearing_deg": float(np.median(d)) if len(d) else float("nan"),
+                    "front_back": float((d > 90).mean()) if len(d) else float("nan"),
+                }
+            )
+    return pd.DataFrame(rows)

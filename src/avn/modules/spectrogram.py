@@ -1,0 +1,181 @@
+"""From clips to the pictures that the sound network sees: pooled spectrograms of two ears."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from avn.errors import UserError
+
+# Power is never logged below this; it lies under the microphone's noise floor in any band.
+POWER_FLOOR = 1e-12
+# Clips whose pictures are made at once.
+TOGETHER = 8
+
+
+@dataclass
+class SpectrogramConfig:
+    """What a `Spectrogram` is built from; see there."""
+
+    _target_: str = "avn.modules.spectrogram.Spectrogram"
+    rate: int = 16000
+    window: int = 512
+    bands: int = 64
+    frames: int = 64
+    scale: str = "mel"
+    interaural: bool = True
+
+
+class Spectrogram(nn.Module):
+    """Log-power spectrograms of both ears, pooled over frequency bands.
+
+    Parameters
+    ----------
+    rate : int
+        Samples a second; a clip is one second long.
+    window : int
+        Samples of the Hann window.
+    bands, frames : int
+        Height and width of the picture. `frames` divides `rate`.
+    scale : {"mel", "linear"}
+        How the bands are spread over frequency.
+    interaural : bool
+        Adds two pictures: real and imaginary part of the interaural coherence of each band and
+        frame. Its phase is the time difference between the ears, its size falls with
+        reverberation; power alone has lost both.
+
+    Raises
+    ------
+    UserError
+        Where a parameter cannot work, by its name in the config.
+    """
+
+    band_weights: Tensor
+    hann: Tensor
+
+    def __init__(
+        self,
+        rate: int = 16000,
+        window: int = 512,
+        bands: int = 64,
+        frames: int = 64,
+        scale: str = "mel",
+        interaural: bool = True,
+    ) -> None:
+        super().__init__()
+        _check(rate, window, bands, frames, scale)
+        self.rate, self.window, self.frames, self.bands = rate, window, frames, bands
+        self.interaural = interaural
+        # Made again from the config at every start, so not part of a checkpoint.
+        self.register_buffer("hann", torch.hann_window(window), persistent=False)
+        weights = band_weights(rate, window, bands, scale)
+        self.register_buffer("band_weights", weights, persistent=False)
+
+    @property
+    def channels(self) -> int:
+        """How many pictures a clip gives: 2, with interaural coherence 4."""
+        return 4 if self.interaural else 2
+
+    def forward(self, clips: Tensor) -> Tensor:
+        """Compute the pictures of N clips.
+
+        The absolute level is kept: a clip 20 dB louder gives pictures higher by 2.
+
+        Parameters
+        ----------
+        clips : (N, 2, rate) float32 tensor
+            Left and right ear. A clip is periodic: its end meets its start.
+
+        Returns
+        -------
+        (N, channels, bands, frames) float32 tensor
+            Left and right power in units of 10 dB, shifted by 4 so that usual clips lie round 0;
+            then, where asked for, the coherence in -1..1.
+        """
+        # Few at a time, so that what lies between stays in a CPU's caches: twice as fast.
+        return torch.cat([self._pictures(part) for part in clips.split(TOGETHER)])
+
+    def _pictures(self, clips: Tensor) -> Tensor:
+        """(N, 2, rate) to (N, channels, bands, frames)."""
+        spectra = self._stft(clips)
+        real, imaginary = spectra.real.contiguous(), spectra.imag.contiguous()
+        values = real.new_empty(len(clips), self.channels, *real.shape[2:])
+        values[:, :2] = real.square().addcmul_(imaginary, imaginary)
+        if self.interaural:
+            # Left times the conjugate of right.
+            (left, right), (left_i, right_i) = real.unbind(1), imaginary.unbind(1)
+            values[:, 2] = (left * right).addcmul_(left_i, right_i)
+            values[:, 3] = (left_i * right).addcmul_(left, right_i, value=-1.0)
+        pooled = (values @ self.band_weights).transpose(-1, -2)
+        power = pooled[:, :2]
+        pooled[:, 2:] /= (power[:, 0] * power[:, 1]).sqrt().clamp_min(POWER_FLOOR)[:, None]
+        pooled[:, :2] = torch.log10(power.clamp_min(POWER_FLOOR)) + 4.0
+        return pooled
+
+    def _stft(self, clips: Tensor) -> Tensor:
+        """(N, 2, rate) to (N, 2, frames, window / 2 + 1) complex, of mean square per bin."""
+        hop = self.rate // self.frames
+        # The clip is circular, so its start follows its end and no edge needs padding.
+        around = torch.cat((clips, clips[..., : self.window]), -1)
+        windows = around.unfold(-1, self.window, hop)[..., : self.frames, :]
+        # The scale makes the sum over bins the mean square of the signal.
+        scale = math.sqrt(2.0 / (self.window * float(self.hann.square().sum())))
+        return torch.fft.rfft(windows * (self.hann * scale))
+
+    def mirror(self, pictures: Tensor) -> Tensor:
+        """The pictures of the same clips with the ears exchanged.
+
+        Parameters
+        ----------
+        pictures : (N, channels, bands, frames) tensor
+
+        Returns
+        -------
+        (N, channels, bands, frames) tensor
+            Left and right exchanged; the phase between them changes its sign.
+        """
+        left, right, *coherence = pictures.unbind(1)
+        if coherence:
+            coherence[1] = -coherence[1]
+        return torch.stack((right, left, *coherence), 1)
+
+
+def band_weights(rate: int, window: int, bands: int, scale: str) -> Tensor:
+    """Overlapping triangles that pool the bins of a spectrum into bands.
+
+    The mel scale is that of O'Shaughnessy, 2595 log10(1 + f / 700). A triangle narrower than
+    the spacing of bins is widened to it, so that no band is empty.
+
+    Returns
+    -------
+    (window / 2 + 1, bands) float32 tensor
+    """
+    bins = torch.linspace(0.0, rate / 2, window // 2 + 1, dtype=torch.float64)
+    top = rate / 2
+    if scale == "mel":
+        mel = torch.linspace(0.0, 2595 * math.log10(1 + top / 700), bands + 2, dtype=torch.float64)
+        edges = 700 * (10 ** (mel / 2595) - 1)
+    else:
+        edges = torch.linspace(0.0, top, bands + 2, dtype=torch.float64)
+    spacing = rate / window
+    centres = edges[1:-1]
+    below = (centres - edges[:-2]).clamp_min(spacing)
+    above = (edges[2:] - centres).clamp_min(spacing)
+    offset = bins[:, None] - centres
+    triangle = torch.where(offset < 0, 1 + offset / below, 1 - offset / above)
+    return triangle.clamp_min(0.0).float()
+
+
+def _check(rate: int, window: int, bands: int, frames: int, scale: str) -> None:
+    where = "sound_model.spectrogram"
+    if scale not in ("mel", "linear"):
+        raise UserError(f"{where}.scale is '{scale}'; give mel or linear")
+    if not 2 <= window <= rate:
+        raise UserError(f"{where}.window is {window}; give 2 to {rate} samples")
+    if frames < 1 or rate % frames:
+        raise UserError(f"{where}.frames is {frames}; give a divisor of {rate}, such as 64")
+    if not 1 <= bands <= window // 2:
+        raise UserError(f"{where}.bands is {bands}; give 1 to {window // 2}, half the window")
