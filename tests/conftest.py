@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 
 import pytest
@@ -28,7 +27,6 @@ def command(monkeypatch, capfd):
         except SystemExit as exit_:
             code = exit_.code
         out, err = capfd.readouterr()
-        os.environ.pop("AVN_SWEEP_RECORDS", None)
         return code, out.splitlines(), err.splitlines()
 
     return run

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import tempfile
 import traceback
@@ -52,7 +53,9 @@ def run_job(
 
 def end(name: str) -> int:
     """Print the mean and spread of a sweep and name the jobs that failed; give the exit code."""
-    records = [json.loads(p.read_text()) for p in sorted(Path(os.environ[_RECORDS]).iterdir())]
+    folder = Path(os.environ.pop(_RECORDS))
+    records = [json.loads(path.read_text()) for path in sorted(folder.iterdir())]
+    shutil.rmtree(folder)
     failed = [record for record in records if record["error"]]
     folders = list(dict.fromkeys(record["folder"] for record in records if record["folder"]))
     results = [Path(folder) / "results.csv" for folder in folders]

@@ -53,6 +53,18 @@ class Room(NamedTuple):
     mean_scattering: NDArray[np.float64]
 
 
+def plan_bounds(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The least and the greatest x and y of all rectangles, (2,) each."""
+    corners = np.concatenate(
+        [
+            np.insert(side[room.axis == axis], axis, room.offset[room.axis == axis], axis=1)
+            for side in (room.lower, room.upper)
+            for axis in range(3)
+        ]
+    )
+    return corners.min(axis=0)[:2], corners.max(axis=0)[:2]
+
+
 @njit(cache=True)
 def nearest_hit(position, direction, room: Room) -> tuple[float, int]:  # type: ignore[no-untyped-def]
     """Distance to, and index of, the first rectangle that a ray meets; (inf, -1) if none.

@@ -1,11 +1,14 @@
 """How many rays go where: so many that every place hears about as many, none much louder.
 
 Left to themselves, rays fill an apartment evenly while their energies drift apart by orders of
-magnitude; few loud ones then decide what is heard late or in a far room. So a short survey measures
-the mean energy by place and time. In the main run a ray that is much louder than that splits, and
-one that is much quieter ends by chance, its energy handed to the survivors (a weight window, as in
-neutron transport: T. E. Booth and J. S. Hendricks, Nuclear Technology / Fusion 5, 1984). Neither
-changes the expected energy anywhere, however rough the survey is.
+magnitude; a few loud ones then decide what is heard late or in a far room. So rays are followed for
+some metres at a time. Then, place by place, those that are much louder than the others there split,
+and those that are much quieter end by chance, their energy handed to the survivors (splitting and
+roulette, as in neutron transport: H. Kahn, Proc. Symposium on Monte Carlo Methods, 1954). The
+expected energy stays the same everywhere: it is still the rays alone that make the sound.
+
+A ray stands for a cone, of which its copies take different lines; else copies that meet mirrors
+alone would stay together and be as loud as the one they come from.
 """
 
 import math
@@ -15,108 +18,114 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from avn.acoustics.kernels import Room, nearest_hit, reflect, uniform
+from avn.acoustics.kernels import uniform
 
-CELL = 1.0  # metres
-STEP = 8.0  # metres of the way: about 23 ms
-_SAMPLE = 0.5  # metres between the points at which a stretch is counted
+PLACE = 1.0  # metres: rays are compared with those in the same square of the plan
+_BAND = 2.0  # how much louder or quieter than wanted a ray may be
+_SPLIT = 4.0  # into how many a ray splits at most at one time
+_DRAW = -2  # marks the random numbers of this module
 
 
-class Window(NamedTuple):
-    """The energy wanted of a ray, by place and way travelled.
+class Rays(NamedTuple):
+    """Rays under way: position and direction (N, 3), energy (N, 6), reflections so far (N,)."""
 
-    `low` (2,) is the corner of the grid over x and y; `target` (nx, ny, steps) the energy, 0 where
-    it is not known.
+    position: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    carried: NDArray[np.float64]
+    bounces: NDArray[np.int64]
+
+
+@njit(cache=True)
+def _places(rays: Rays, low, shape):  # type: ignore[no-untyped-def]
+    """The square of the plan that each ray is in."""
+    count = rays.position.shape[0]
+    places = np.empty(count, np.int64)
+    for ray in range(count):
+        ix = min(max(int((rays.position[ray, 0] - low[0]) / PLACE), 0), shape[0] - 1)
+        iy = min(max(int((rays.position[ray, 1] - low[1]) / PLACE), 0), shape[1] - 1)
+        places[ray] = ix * shape[1] + iy
+    return places
+
+
+@njit(cache=True)
+def _share_out(rays: Rays, low, shape, wanted: float, seed: int, step: int):  # type: ignore[no-untyped-def]
+    """How many copies of each ray go on, and by what its energy is multiplied in each.
+
+    Within a place copies are dealt by systematic sampling: their number is right to within one,
+    not only in the mean.
     """
-
-    low: NDArray[np.float64]
-    target: NDArray[np.float64]
-
-
-@njit(cache=True)
-def wanted_energy(window: Window, position, travelled: float) -> float:  # type: ignore[no-untyped-def]
-    """The energy wanted of a ray that is at a position after a way."""
-    nx, ny, steps = window.target.shape
-    ix = min(max(int((position[0] - window.low[0]) / CELL), 0), nx - 1)
-    iy = min(max(int((position[1] - window.low[1]) / CELL), 0), ny - 1)
-    return window.target[ix, iy, min(int(travelled / STEP), steps - 1)]
-
-
-@njit(cache=True)
-def _count(tally, low, position, direction, length, travelled, energy) -> None:  # type: ignore[no-untyped-def]
-    pieces = int(length / _SAMPLE) + 1
-    _, nx, ny, steps = tally.shape
-    for piece in range(pieces):
-        way = (piece + 0.5) * length / pieces
-        ix = int((position[0] + way * direction[0] - low[0]) / CELL)
-        iy = int((position[1] + way * direction[1] - low[1]) / CELL)
-        step = int((travelled + way) / STEP)
-        if 0 <= ix < nx and 0 <= iy < ny and step < steps:
-            tally[0, ix, iy, step] += length / pieces
-            tally[1, ix, iy, step] += energy * length / pieces
+    count = rays.position.shape[0]
+    places = _places(rays, low, shape)
+    total, carry = np.zeros(shape[0] * shape[1]), np.zeros(shape[0] * shape[1])
+    occupied = 0
+    for ray in range(count):
+        if total[places[ray]] == 0.0:
+            occupied += 1
+        total[places[ray]] += rays.carried[ray].sum()
+    for place in range(carry.shape[0]):
+        carry[place] = uniform(seed, place, _DRAW, step)
+    copies, factor = np.ones(count, np.int64), np.ones(count)
+    for ray in range(count):
+        place = places[ray]
+        energy = total[place] * occupied / wanted  # that each ray of the place should have
+        ratio = rays.carried[ray].sum() / energy
+        if 1.0 / _BAND <= ratio <= _BAND:
+            continue
+        ratio = min(ratio, _SPLIT)
+        carry[place] += ratio
+        copies[ray] = int(carry[place])
+        carry[place] -= copies[ray]
+        factor[ray] = 1.0 / ratio
+    return copies, factor
 
 
 @njit(cache=True)
-def _survey(
-    directions, source, room: Room, reach: float, depth: int, seed: int, low, tally
-) -> None:  # type: ignore[no-untyped-def]
-    """Count metres, and energy x metres, of rays by place and way."""
-    position, direction = np.empty(3), np.empty(3)
-    carried = np.empty(room.reflection.shape[1])
-    for ray in range(directions.shape[0]):
-        position[:] = source
-        direction[:] = directions[ray]
-        carried[:] = 1.0
-        travelled = 0.0
-        for bounce in range(depth + 1):
-            length, quad = nearest_hit(position, direction, room)
-            length = min(length, reach - travelled)
-            _count(tally, low, position, direction, length, travelled, carried.mean())
-            travelled += length
-            if quad < 0 or travelled >= reach:
-                break
-            axis = room.axis[quad]
-            for i in range(3):
-                position[i] += length * direction[i]
-            position[axis] = room.offset[quad]
-            carried *= room.reflection[quad]
-            specular = uniform(seed, ray, bounce, 0) >= room.mean_scattering[quad]
-            one, two = uniform(seed, ray, bounce, 1), uniform(seed, ray, bounce, 2)
-            reflect(direction, axis, specular, one, two)
+def _spread(direction, parent, radius: float, seed: int, step: int) -> None:  # type: ignore[no-untyped-def]
+    """Turn copies (not the first of a ray) by up to `radius` radians, evenly over that cone."""
+    for ray in range(1, direction.shape[0]):
+        if parent[ray] != parent[ray - 1]:
+            continue
+        away = radius * math.sqrt(uniform(seed, ray, _DRAW - 1, 2 * step))
+        angle = 2 * math.pi * uniform(seed, ray, _DRAW - 1, 2 * step + 1)
+        old = direction[ray].copy()
+        # A unit vector at right angles: the axis on which the ray leans least, made upright.
+        least = np.argmin(np.abs(old))
+        one = -old[least] * old
+        one[least] += 1.0
+        one /= math.sqrt((one * one).sum())
+        two = np.cross(old, one)
+        new = old + away * (math.cos(angle) * one + math.sin(angle) * two)
+        direction[ray] = new / math.sqrt((new * new).sum())
 
 
-def survey(
-    directions: NDArray[np.float64],
-    source: NDArray[np.float64],
-    room: Room,
-    reach: float,
-    depth: int,
+def even_out(
+    rays: Rays,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    wanted: int,
     seed: int,
-    rays: int,
-) -> Window:
-    """The window for a run of `rays` rays, from a survey with fewer directions (n, 3)."""
-    bounds = np.concatenate([_bounds(room, low=True), _bounds(room, low=False)])
-    low, high = bounds[:2], bounds[2:]
-    shape = np.maximum(np.ceil((high - low) / CELL), 1).astype(int)
-    tally = np.zeros((2, *shape, math.ceil(reach / STEP)))
-    _survey(directions, source, room, reach, depth, seed, low, tally)
-    metres, energy = tally
-    # Rays that mix fill the air evenly, so metres stand for the volume of air at a place.
-    volume = metres.sum(axis=2, keepdims=True) / max(metres.sum(), 1e-12)
-    evenly = volume * metres.sum(axis=(0, 1), keepdims=True)
-    target = np.divide(energy, evenly, out=np.zeros_like(energy), where=evenly > 0)
-    return Window(low, target / rays)
+    step: int,
+) -> Rays:
+    """Split loud rays and end quiet ones, so that places have about equally many.
 
-
-def _bounds(room: Room, low: bool) -> NDArray[np.float64]:
-    """The least or greatest x and y of all rectangles."""
-    side, pick = (room.lower, np.min) if low else (room.upper, np.max)
-    values = []
-    for axis in range(2):
-        own = room.offset[room.axis == axis]
-        # The bounds on the two other axes are in ascending order of axis.
-        others = [
-            side[room.axis == a, axis if a > axis else axis - 1] for a in range(3) if a != axis
-        ]
-        values.append(pick(np.concatenate([own, *others])))
-    return np.array(values)
+    Parameters
+    ----------
+    rays : Rays
+    low, high : array, shape (2,)
+        Bounds of the plan, metres.
+    wanted : int
+        How many rays there are to be, about.
+    seed, step : int
+        Of the random numbers.
+    """
+    shape = np.maximum(np.ceil((high - low) / PLACE), 1).astype(np.int64)
+    copies, factor = _share_out(rays, low, shape, float(wanted), seed, step)
+    parent = np.repeat(np.arange(len(copies)), copies)
+    direction = rays.direction[parent]
+    _spread(direction, parent, 2.0 / np.sqrt(wanted), seed, step)
+    return Rays(
+        rays.position[parent],
+        direction,
+        rays.carried[parent] * factor[parent, None],
+        rays.bounces[parent],
+    )

@@ -4,7 +4,8 @@ Rays leave the source on a Fibonacci lattice, carry energy in six octave bands a
 like from a mirror or after Lambert's law, by the scattering of what they meet. Listeners are
 spheres; a ray that crosses one adds energy x chord / volume, which is the energy that flows through
 the place per unit of area (E / (4 pi D^2) for the direct sound). The direct sound itself is left
-out: `avn.acoustics.first_arrival` adds it exactly.
+out: `avn.acoustics.first_arrival` adds it exactly. `avn.acoustics.population` keeps about as many
+rays in every place.
 
 A ray has one direction for all bands. It is drawn by the mean scattering over the bands; at its
 first reflections, which shape what is heard most, each band is weighted so that its own scattering
@@ -12,23 +13,24 @@ holds in the mean. Weighting all reflections would let the weights of a long pat
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from avn.acoustics import materials
-from avn.acoustics.kernels import Room, uniform
-from avn.acoustics.population import survey
-from avn.acoustics.rays import Limits, Record, trace_rays
-from avn.acoustics.receivers import sort_listeners
+from avn.acoustics.kernels import Room, plan_bounds, uniform
+from avn.acoustics.population import Rays, even_out
+from avn.acoustics.rays import Limits, Record, follow
+from avn.acoustics.receivers import Listeners, sort_listeners
 from avn.apartments.surfaces import Surfaces
 
-LATE_REACH = 1.5  # how far past `seconds` some rays go on, to measure what is cut off
-LATE_EVERY = 4  # one ray in so many does
+LATE_REACH = 1.5  # rays go on for so many times `seconds`, to measure what is cut off
+LATE_EVERY = 4  # one ray for so many goes on there
 WEIGHTED_REFLECTIONS = 2
 ENERGY_FLOOR = 1e-8  # a ray that has lost 80 dB in its loudest band ends
-SURVEY = 8  # one ray for so many goes ahead to survey where energy is
-_EVENTS_AT_ONCE = 1 << 18
+STEP = 5.0  # metres for which rays are followed before their numbers are evened out
+_EVENTS_AT_ONCE = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,53 @@ def _empty_record(size: int) -> Record:
     )
 
 
+def _start(source: NDArray[np.float64], rays: int, seed: int) -> Rays:
+    directions = fibonacci_directions(rays, 2 * np.pi * uniform(seed, 0, -1, 0))
+    return Rays(
+        np.tile(source, (rays, 1)),
+        directions,
+        np.full((rays, len(materials.BANDS)), 1.0 / rays),
+        np.zeros(rays, np.int64),
+    )
+
+
+def _follow_all(
+    rays: Rays,
+    room: Room,
+    attenuation: NDArray[np.float64],
+    spheres: Listeners,
+    limits: Limits,
+    reach: float,
+    seed: int,
+) -> Record:
+    """Follow rays step by step to `reach` metres, and a part of them on to what is cut off."""
+    wanted = len(rays.position)
+    low, high = plan_bounds(room)
+    steps = max(1, round(reach / STEP))
+    ends = np.linspace(0, reach, steps + 1)
+    late = np.linspace(reach, LATE_REACH * reach, max(1, steps // 2) + 1)
+    ways = np.concatenate([ends, late[1:]])
+    parts: list[Record] = []
+    size = _EVENTS_AT_ONCE
+    for step, (begin, end) in enumerate(pairwise(ways)):
+        while True:
+            moved = Rays(*(array.copy() for array in rays))  # type: ignore[arg-type]
+            part = _empty_record(size)
+            going, count = follow(
+                moved, begin, end, step, room, attenuation, spheres, limits, seed, part
+            )
+            if count >= 0:
+                break
+            size *= 2
+        parts.append(Record(*(array[:count].copy() for array in part)))  # type: ignore[arg-type]
+        if going == 0:
+            break
+        rays = Rays(*(array[:going] for array in moved))  # type: ignore[arg-type]
+        now_wanted = wanted if end < reach else max(wanted // LATE_EVERY, 1)
+        rays = even_out(rays, low, high, now_wanted, seed, step)
+    return Record(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))  # type: ignore[arg-type]
+
+
 def trace(
     surfaces: Surfaces,
     source: NDArray[np.float64],
@@ -168,29 +217,12 @@ def trace(
     """
     room = _sorted_room(surfaces, absorption, scattering)
     centres = np.ascontiguousarray(listeners, dtype=np.float64).reshape(-1, 3)
-    reach = seconds * materials.SPEED_OF_SOUND
-    limits = Limits(
-        depth, reach, LATE_REACH * reach, LATE_EVERY, ENERGY_FLOOR, WEIGHTED_REFLECTIONS
-    )
-    spheres = sort_listeners(centres, radius)
     attenuation = materials.air_attenuation() if air else np.zeros(len(materials.BANDS))
-    directions = fibonacci_directions(rays, 2 * np.pi * uniform(seed, 0, -1, 0))
-    place = np.asarray(source, dtype=np.float64)
-    turn = 2 * np.pi * uniform(seed, 0, -1, 1)
-    few = fibonacci_directions(max(rays // SURVEY, 200), turn)
-    window = survey(few, place, room, limits.late_reach, depth, seed, rays)
-    parts: list[tuple[NDArray, ...]] = []
-    ray, size = 0, _EVENTS_AT_ONCE
-    while ray < rays:
-        part = _empty_record(size)
-        after, count = trace_rays(
-            ray, directions, place, room, attenuation, spheres, window, limits, seed, part
-        )
-        parts.append(tuple(array[:count].copy() for array in part))
-        size = size if after > ray else 2 * size  # one ray alone may fill it
-        ray = after
-    who, distance, energy, arrival, sign = (
-        np.concatenate(arrays) for arrays in zip(*parts, strict=True)
+    limits = Limits(depth, ENERGY_FLOOR / rays, WEIGHTED_REFLECTIONS)
+    started = _start(np.asarray(source, dtype=np.float64), rays, seed)
+    spheres = sort_listeners(centres, radius)
+    who, distance, energy, arrival, sign = _follow_all(
+        started, room, attenuation, spheres, limits, seconds * materials.SPEED_OF_SOUND, seed
     )
     sorting = np.argsort(who, kind="stable")
     counts = np.bincount(who, minlength=len(centres))
