@@ -30,7 +30,7 @@ EPISODES = {"frozen": frozen_episodes, "exhaustive": exhaustive_episodes}
 
 def run_hash(cfg: DictConfig) -> str:
     """Hash of what a run's records depend on."""
-    acoustics = pipeline.typed(cfg.acoustics)
+    acoustics = pipeline.acoustics_of(cfg)
     apartments = [build.first_arrival_hash(p, acoustics) for p in pipeline.plans(cfg)["test"]]
     ears = pipeline.model_hash(cfg) if pipeline.hears(cfg) else None
     rules = (cfg.protocol, cfg.baseline, cfg.agent, cfg.seed, cfg.episodes, cfg.takes)

@@ -18,7 +18,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
-from avn.acoustics.brir import AcousticsConfig
+from avn.acoustics.brir import AcousticsConfig, check_config
 from avn.acoustics.clips import DrySounds, MicrophoneConfig
 from avn.acoustics.dry_sounds import BUILTIN, content_hash, load_sounds
 from avn.apartments.floor_plan import FloorPlan
@@ -47,6 +47,11 @@ def typed(node: DictConfig) -> Any:
     return OmegaConf.to_object(node)
 
 
+def acoustics_of(cfg: DictConfig) -> AcousticsConfig:
+    """The node `acoustics`; raises `UserError` for a value that makes no sense."""
+    return check_config(typed(cfg.acoustics))
+
+
 def plans(cfg: DictConfig) -> dict[str, list[FloorPlan]]:
     """Floor plans of the split, by part: train, validation, test."""
     return _plans(OmegaConf.to_yaml(cfg.split, resolve=True), typed(cfg.split))
@@ -64,7 +69,7 @@ def _plans(key: str, split: SplitConfig) -> dict[str, list[FloorPlan]]:
 
 def scenes_folder(cfg: DictConfig) -> Path:
     """The folder that holds the scene folders of the split."""
-    acoustics: AcousticsConfig = typed(cfg.acoustics)
+    acoustics = acoustics_of(cfg)
     hashes = [build.tail_hash(plan, acoustics) for part in plans(cfg).values() for plan in part]
     return stage_folder(cfg.outputs, "generate", cfg.split.name, digest(hashes))
 
@@ -89,7 +94,7 @@ def scenes(
     for part, found in chosen.items():
         if not found:
             raise UserError(f"split.{part}: split '{cfg.split.name}' has no {part} apartment")
-    acoustics: AcousticsConfig = typed(cfg.acoustics)
+    acoustics = acoustics_of(cfg)
     folder = scenes_folder(cfg)
     opened = {
         part: [build.build_geometry(plan, acoustics, folder / plan.name) for plan in found]
@@ -121,7 +126,7 @@ def sound_files(cfg: DictConfig) -> dict[str, str]:
 
 def model_hash(cfg: DictConfig) -> str:
     """Hash of what the sound network's weights depend on."""
-    acoustics: AcousticsConfig = typed(cfg.acoustics)
+    acoustics = acoustics_of(cfg)
     apartments = {
         part: [build.first_arrival_hash(plan, acoustics) for plan in plans(cfg)[part]]
         for part in ("train", "validation")
@@ -196,7 +201,7 @@ def hearing(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
     model, folder = sound_model(cfg)
     sounds = sound_files(cfg)
     ears = _Ears(model, sounds, cfg.acoustics.name, typed(cfg.microphone), cfg.takes)
-    acoustics: AcousticsConfig = typed(cfg.acoustics)
+    acoustics = acoustics_of(cfg)
     made_from = digest(folder.name, content_hash(sounds), cfg.takes, VERSIONS["hear"])
     target = stage_folder(cfg.outputs, "hear", "-".join(sounds), made_from)
     clips = sum(4 * s.grid.cells * len(s.sources) for s in chosen) * len(sounds) * cfg.takes

@@ -11,7 +11,6 @@ import shutil
 from collections.abc import Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,6 @@ import numpy as np
 from avn.acoustics import brir
 from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.first_arrival import FirstArrivals
-from avn.acoustics.materials import NAMES, absorption, scattering
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid, source_cells
 from avn.apartments.sight import line_of_sight
@@ -46,13 +44,7 @@ def geometry_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
 def tail_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
     """Hash of what the traced reverberation is made from; the regime is no part of it."""
     settings = {key: value for key, value in asdict(acoustics).items() if key not in _REGIME}
-    return digest(plan.to_dict(), settings, _assets_hash(acoustics.rate), MAKING["tail"])
-
-
-@cache
-def _assets_hash(rate: int) -> str:
-    """Hash of the heads and of the materials, which the responses depend on too."""
-    return digest(brir.head_filters(rate), absorption(NAMES), scattering(NAMES), NAMES)
+    return digest(plan.to_dict(), settings, brir.assets_hash(), MAKING["tail"])
 
 
 def first_arrival_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
