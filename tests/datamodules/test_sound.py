@@ -100,19 +100,19 @@ def test_an_epoch_hears_every_pair_in_its_own_take(clips: ClipSet, sounds_per_pa
 def test_loaders_give_whole_batches() -> None:
     module = data()
     batch = next(iter(module.train_dataloader()))
-    assert batch["clips"].shape == (16, 2, 16000)
+    assert batch["pictures"].shape == (16, 4, 64, 64)
     validation, training = module.val_dataloader()
     for loader in (validation, training):
         assert sum(len(batch["target"]) for batch in loader) == 50
-    again = next(iter(module.val_dataloader()[0]))["clips"]
-    assert torch.equal(next(iter(validation))["clips"], again)
+    again = next(iter(module.val_dataloader()[0]))["pictures"]
+    assert torch.equal(next(iter(validation))["pictures"], again)
 
 
 def test_validation_clips_are_the_same_for_every_train_seed() -> None:
     first, second = data(train_seed=0), data(train_seed=1)
-    batches = [next(iter(module.val_dataloader()[0]))["clips"] for module in (first, second)]
+    batches = [next(iter(module.val_dataloader()[0]))["pictures"] for module in (first, second)]
     assert torch.equal(*batches)
-    batches = [next(iter(module.train_dataloader()))["clips"] for module in (first, second)]
+    batches = [next(iter(module.train_dataloader()))["pictures"] for module in (first, second)]
     assert not torch.equal(*batches)
 
 

@@ -10,7 +10,7 @@ from omegaconf import DictConfig, OmegaConf
 from avn.errors import UserError
 from avn.modules.five_layer_cnn import FiveLayerCnn
 from avn.modules.sound_cnn import (
-    ClipBatch,
+    PictureBatch,
     SoundCnn,
     SoundModelConfig,
     no_sound_model,
@@ -89,7 +89,8 @@ def test_a_batch_is_learned(clips: torch.Tensor) -> None:
     optimizer = torch.optim.Adam(model.parameters(), 1e-2)
     target = torch.tensor([[3.0, 1.0], [-2.0, 4.0], [0.5, -3.0], [-1.0, -1.0]])
     nothing = torch.zeros(4, dtype=torch.int64)
-    batch = ClipBatch(clips=clips, target=target, in_sight=nothing.bool(), sound=nothing)
+    pictures = model.spectrogram(clips)
+    batch = PictureBatch(pictures=pictures, target=target, in_sight=nothing.bool(), sound=nothing)
     losses = []
     for _ in range(80):
         optimizer.zero_grad()

@@ -48,7 +48,7 @@ def test_training_lowers_the_error(run: tuple[Path, dict[str, Any]]) -> None:
     data, untrained = build()
     batches = list(data.val_dataloader()[1])
     with torch.inference_mode():
-        heard = torch.cat([untrained.eval()(batch["clips"]) for batch in batches])
+        heard = torch.cat([untrained.eval().estimate(batch["pictures"]) for batch in batches])
     target = torch.cat([batch["target"] for batch in batches])
     before = torch.nn.functional.mse_loss(heard, target)
     assert metrics["loss/training"] < float(before)

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import lightning as L
 import torch
 from torch import Tensor
-from torch.utils.data import DataLoader, Dataset, Sampler
+from torch.utils.data import Dataset, Sampler
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
 from avn.apartments.floor_plan import CELL
+from avn.datamodules.ahead import AheadLoader
 from avn.dataset.scene import Brirs, Scene
 from avn.errors import UserError
-from avn.modules.sound_cnn import ClipBatch, SoundModelConfig
+from avn.modules.sound_cnn import ClipBatch, PictureBatch, SoundModelConfig, build_part
+from avn.modules.spectrogram import Spectrogram
 
 # The clips on which networks in training are compared; the same for every `train_seed`.
 VALIDATION_SEED = 0
@@ -153,8 +154,33 @@ class ClipSet(Dataset[ClipBatch]):
         return brirs
 
 
-def _as_it_is(batch: Any) -> Any:
-    return batch
+class PictureSet(Dataset[PictureBatch]):
+    """Clips as the pictures that the network sees, made where the clips are made.
+
+    Parameters
+    ----------
+    clips : ClipSet
+    spectrogram : Spectrogram
+    """
+
+    def __init__(self, clips: ClipSet, spectrogram: Spectrogram) -> None:
+        self.clips, self.spectrogram = clips, spectrogram
+
+    def __len__(self) -> int:
+        return len(self.clips)
+
+    def __getitem__(self, item: int) -> PictureBatch:
+        return self.__getitems__([item])
+
+    def __getitems__(self, items: Sequence[int]) -> PictureBatch:
+        """Render a batch and take its spectrograms."""
+        batch = self.clips.__getitems__(items)
+        return PictureBatch(
+            pictures=self.spectrogram(batch["clips"]),
+            target=batch["target"],
+            in_sight=batch["in_sight"],
+            sound=batch["sound"],
+        )
 
 
 class FreshTakes(Sampler[int]):
@@ -235,6 +261,9 @@ class SoundData(L.LightningDataModule):
             raise UserError("sound_model.batch and sound_model.validation_clips must be 1 or more")
         self.scenes = {"validation": list(validation), "training": list(train)}
         self.sounds, self.recipe = sounds, recipe
+        self.spectrogram: Spectrogram = build_part(recipe.spectrogram)
+        # Threads that render; the network learns in others.
+        self.threads = 1
         seed = recipe.train_seed
         self.train_clips = ClipSet(train, regime, sounds, microphone, "train", seed)
         self.measured_clips = {
@@ -242,12 +271,12 @@ class SoundData(L.LightningDataModule):
             for split, scenes in self.scenes.items()
         }
 
-    def train_dataloader(self) -> DataLoader[ClipBatch]:
+    def train_dataloader(self) -> AheadLoader:
         """Every pair once an epoch (`sounds_per_pair` times), each time in a fresh take."""
         sampler = FreshTakes(self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair)
         return self._loader(self.train_clips, sampler)
 
-    def val_dataloader(self) -> list[DataLoader[ClipBatch]]:
+    def val_dataloader(self) -> list[AheadLoader]:
         """Fixed clips of the validation and of the training apartments, in this order."""
         loaders = []
         for clips in self.measured_clips.values():
@@ -257,12 +286,6 @@ class SoundData(L.LightningDataModule):
             loaders.append(self._loader(clips, items.sort().values.tolist()))
         return loaders
 
-    def _loader(self, clips: ClipSet, sampler: Sampler[int] | list[int]) -> DataLoader[ClipBatch]:
-        # A generator of its own, so that the loader does not draw from the global one.
-        return DataLoader(
-            clips,
-            batch_size=self.recipe.batch,
-            sampler=sampler,
-            collate_fn=_as_it_is,
-            generator=torch.Generator(),
-        )
+    def _loader(self, clips: ClipSet, sampler: Sampler[int] | list[int]) -> AheadLoader:
+        pictures = PictureSet(clips, self.spectrogram)
+        return AheadLoader(pictures, self.threads, batch_size=self.recipe.batch, sampler=sampler)

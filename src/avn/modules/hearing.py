@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
+from avn.datamodules.ahead import made_ahead, threads_for_one_operation
 from avn.datamodules.sound import SceneClips
 from avn.dataset.scene import Scene
 from avn.modules.sound_cnn import SoundCnn
@@ -64,23 +65,21 @@ def hear(
     model.eval()
     what = f"listening in {scene.name}"
     bar = progress_bar(what, len(source) * each, "clips") if progress else nullcontext(_silent)
-    with torch.inference_mode(), bar as advance:
+
+    @torch.inference_mode()
+    def listen(rows: Tensor) -> Tensor:
         # Whole pairs, so that an impulse response is transformed once for all its clips.
-        for rows in torch.arange(len(source)).split(max(1, BATCH // each)):
-            spectra = brir_spectra(brirs.gather(source[rows], state[rows]))
-            index = torch.arange(len(rows)).repeat_interleave(each)
-            clip = rows[index]
-            repeats = len(rows)
-            clips = renderer.render(
-                spectra,
-                source[clip],
-                state[clip],
-                sound.repeat(repeats),
-                take.repeat(repeats),
-                index,
-            )
-            heard[rows] = model(clips.to(model.device)).cpu().unflatten(0, (repeats, each))
-            advance(len(clip))
+        spectra = brir_spectra(brirs.gather(source[rows], state[rows]))
+        index = torch.arange(len(rows)).repeat_interleave(each)
+        which = (source[rows][index], state[rows][index], sound.repeat(len(rows)))
+        clips = renderer.render(spectra, *which, take.repeat(len(rows)), index)
+        return model(clips.to(model.device)).cpu()
+
+    threads, parts = torch.get_num_threads(), torch.arange(len(source)).split(max(1, BATCH // each))
+    with bar as advance, threads_for_one_operation(1):
+        for rows, found in zip(parts, made_ahead(listen, parts, threads), strict=True):
+            heard[rows] = found.unflatten(0, (len(rows), each))
+            advance(len(found))
     return heard.reshape(sources, states, len(sounds.names), takes, 2)
 
 

@@ -39,6 +39,15 @@ class ClipBatch(TypedDict):
     sound: Tensor
 
 
+class PictureBatch(TypedDict):
+    """The same of N clips as pictures (N, channels, bands, frames) float32."""
+
+    pictures: Tensor
+    target: Tensor
+    in_sight: Tensor
+    sound: Tensor
+
+
 @dataclass
 class OptimizerConfig:
     """The optimiser and its rate; any class of torch.optim that takes these two."""
@@ -75,7 +84,7 @@ def no_sound_model(**_: Any) -> None:
     """What the option `none` of the group builds: nothing, so that no agent hears."""
 
 
-def _build(config: dict[str, Any], **given: Any) -> Any:
+def build_part(config: Any, **given: Any) -> Any:
     """Build an object from its config; a mistake of the user's stays one."""
     try:
         return instantiate(config, **given)
@@ -133,11 +142,11 @@ class SoundCnn(L.LightningModule):
             if value < 1:
                 raise UserError(f"sound_model.{key} is {value}; give at least 1")
         self.mirror, self.symmetric, self.train_seed = mirror, symmetric, train_seed
-        self.spectrogram: Spectrogram = _build(spectrogram)
+        self.spectrogram: Spectrogram = build_part(spectrogram)
         shape = (self.spectrogram.channels, self.spectrogram.bands, self.spectrogram.frames)
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(train_seed)
-            built = _build(net, channels=shape[0], height=shape[1], width=shape[2])
+            built = build_part(net, channels=shape[0], height=shape[1], width=shape[2])
         self.net: nn.Module = built.to(memory_format=torch.channels_last)
         self.training_loss = MeanSquaredError()
         # Plain lists: they take what is already on the CPU and are no part of a checkpoint.
@@ -174,9 +183,9 @@ class SoundCnn(L.LightningModule):
         """Say what the sounds of the batches are called; the metrics are by these names."""
         self.errors = [LocationErrors(sounds) for _ in SPLITS]
 
-    def training_step(self, batch: ClipBatch, index: int) -> Tensor:
+    def training_step(self, batch: PictureBatch, index: int) -> Tensor:
         """The mean square error in square metres, with half of the clips mirrored."""
-        pictures, target = self.spectrogram(batch["clips"]), batch["target"]
+        pictures, target = batch["pictures"], batch["target"]
         if self.mirror:
             chosen = torch.rand(len(target)).lt(0.5).to(target.device)
             mirrored = self.spectrogram.mirror(pictures)
@@ -196,9 +205,9 @@ class SoundCnn(L.LightningModule):
         self.log("loss/steps", self.training_loss.compute() * 1.0)
         self.training_loss.reset()
 
-    def validation_step(self, batch: ClipBatch, index: int, dataloader_idx: int = 0) -> None:
+    def validation_step(self, batch: PictureBatch, index: int, dataloader_idx: int = 0) -> None:
         """Take in the errors of one batch of one of `SPLITS`."""
-        estimate, target = self(batch["clips"]).cpu(), batch["target"].cpu()
+        estimate, target = self.estimate(batch["pictures"]).cpu(), batch["target"].cpu()
         self.losses[dataloader_idx].update(estimate.flatten(), target.flatten())
         in_sight, sound = batch["in_sight"].cpu(), batch["sound"].cpu()
         self.errors[dataloader_idx].update(estimate, target, in_sight, sound)
@@ -217,7 +226,7 @@ class SoundCnn(L.LightningModule):
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
         """The optimiser of the recipe; the rate follows `schedule` step by step."""
-        optimizer = _build(self.hparams["optimizer"], params=list(self.net.parameters()))
+        optimizer = build_part(self.hparams["optimizer"], params=list(self.net.parameters()))
         steps = int(self.trainer.estimated_stepping_batches)
         return {
             "optimizer": optimizer,

@@ -14,6 +14,7 @@ import torch
 from lightning.pytorch.callbacks import Callback, EarlyStopping, ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
 
+from avn.datamodules.ahead import threads_for_one_operation
 from avn.datamodules.sound import SoundData
 from avn.errors import UserError
 from avn.modules.sound_cnn import SPLITS, SoundCnn
@@ -69,7 +70,10 @@ def fit(
         _every_epoch(folder, BEST, MONITOR),
         _every_epoch(folder, LAST, None),
     ]
-    with _quiet(), torch.random.fork_rng(devices=[]):
+    cores = torch.get_num_threads()
+    data.threads = max(1, cores // 2)
+    learning = threads_for_one_operation(max(1, cores - data.threads))
+    with _quiet(), learning, torch.random.fork_rng(devices=[]):
         trainer = L.Trainer(
             default_root_dir=folder,
             accelerator=accelerator,

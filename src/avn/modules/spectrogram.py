@@ -25,7 +25,7 @@ class SpectrogramConfig:
     window: int = 512
     bands: int = 64
     frames: int = 64
-    scale: str = "mel"
+    scale: str = "linear"
     interaural: bool = True
 
 
@@ -62,7 +62,7 @@ class Spectrogram(nn.Module):
         window: int = 512,
         bands: int = 64,
         frames: int = 64,
-        scale: str = "mel",
+        scale: str = "linear",
         interaural: bool = True,
     ) -> None:
         super().__init__()
