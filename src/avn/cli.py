@@ -14,7 +14,6 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import hydra
 import yaml
@@ -28,7 +27,7 @@ from omegaconf.errors import OmegaConfBaseException
 from avn import config, sound_files, sweeps
 from avn.errors import UserError
 
-LIST_KEYS = ("rows", "seeds", "apartments")
+LIST_KEYS = ("rows", "seeds", "train_seeds", "apartments")
 USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
 
 
@@ -75,6 +74,7 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
         return task(cfg)
 
     job.__module__ = name
+    is_sweep = False
     try:
         sys.argv = [sys.argv[0], *arrange(sys.argv[1:])]
         is_sweep = "--multirun" in sys.argv
@@ -91,6 +91,9 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
         return 130
     except Exception as error:
         return _report(name, error, explain(error, composed=False))
+    finally:
+        if is_sweep:
+            sweeps.forget()
 
 
 def _report(name: str, error: Exception, line: str | None) -> int:
@@ -188,8 +191,3 @@ def _one_line(text: str) -> str:
 def _register_plugins() -> None:
     for plugin in (sound_files.AudioFiles, sound_files.AudioFilesPath):
         Plugins.instance().register(plugin)
-
-
-def plain(cfg: Any) -> Any:
-    """A config node as plain lists and dicts, resolved."""
-    return OmegaConf.to_container(cfg, resolve=True)

@@ -6,9 +6,11 @@ key or a wrong type is refused with its name.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from hydra.core.config_store import ConfigStore
+from hydra.types import RunMode
 from omegaconf import MISSING, DictConfig, OmegaConf
 
 from avn.acoustics.brir import AcousticsConfig
@@ -16,15 +18,24 @@ from avn.acoustics.clips import MicrophoneConfig
 from avn.agents.base import BaselineConfig
 from avn.agents.greedy import GreedyConfig
 from avn.apartments.splits import SplitConfig
+from avn.errors import UserError
 from avn.modules.sound_cnn import SoundModelConfig
 from avn.navigation.protocols import ProtocolConfig
 
 
 @dataclass
-class NameConfig:
-    """A node that only names something."""
+class ModelConfig:
+    """What `avn.train` trains."""
 
     name: str = MISSING
+
+
+@dataclass
+class AgentConfig:
+    """A row of the table; a privileged one is shown the truth and is a bound, not an entry."""
+
+    name: str = MISSING
+    privileged: bool = False
 
 
 @dataclass
@@ -57,14 +68,14 @@ class GenerateConfig(CoreConfig):
 class TrainConfig(CoreConfig):
     """Schema of `train.yaml`."""
 
-    model: NameConfig = MISSING
+    model: ModelConfig = MISSING
 
 
 @dataclass
 class EvalConfig(CoreConfig):
     """Schema of `eval.yaml`."""
 
-    agent: NameConfig = MISSING
+    agent: AgentConfig = MISSING
     seed: int = MISSING
     episodes: str = MISSING
 
@@ -75,6 +86,7 @@ class ReproduceConfig(CoreConfig):
 
     rows: list[str] = MISSING
     seeds: list[int] = MISSING
+    train_seeds: list[int] = MISSING
 
 
 COMMANDS = {
@@ -109,10 +121,20 @@ def register() -> None:
 def _run_dir(*, _root_: DictConfig) -> str:
     from avn import evaluation
 
-    return evaluation.run_folder_name(_root_)
+    return _named_or_refused(evaluation.run_folder_name, _root_)
 
 
 def _model_dir(*, _root_: DictConfig) -> str:
     from avn import pipeline
 
-    return pipeline.model_folder_name(_root_)
+    return _named_or_refused(pipeline.model_folder_name, _root_)
+
+
+def _named_or_refused(name: Callable[[DictConfig], str], root: DictConfig) -> str:
+    """The name of a folder; a job of a sweep that cannot be named fails by itself, later."""
+    try:
+        return name(root)
+    except UserError:
+        if root.hydra.mode != RunMode.MULTIRUN:
+            raise
+        return "refused"

@@ -16,7 +16,7 @@ from avn.stages import tell
 def main(cfg: DictConfig) -> Path:
     """Evaluate one row, or open its finished run, and print the table."""
     folder = evaluation.evaluate(cfg)
-    evaluation.show(folder)
+    evaluation.show(cfg, folder)
     tell(str(folder))
     return folder
 

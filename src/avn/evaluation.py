@@ -32,9 +32,9 @@ def run_hash(cfg: DictConfig) -> str:
     """Hash of what a run's records depend on."""
     acoustics = pipeline.acoustics_of(cfg)
     apartments = [build.first_arrival_hash(p, acoustics) for p in pipeline.plans(cfg)["test"]]
-    ears = pipeline.model_hash(cfg) if pipeline.hears(cfg) else None
-    rules = (cfg.protocol, cfg.baseline, cfg.agent, cfg.seed, cfg.episodes, cfg.takes)
-    sounds = content_hash(pipeline.sound_files(cfg))
+    ears = pipeline.hear_hash(cfg) if pipeline.hears(cfg) else None
+    rules = (cfg.protocol, cfg.baseline, cfg.agent, cfg.seed, cfg.episodes)
+    sounds = list(content_hash(pipeline.sound_files(cfg)).items())
     return digest(apartments, ears, rules, sounds, VERSION)
 
 
@@ -63,6 +63,11 @@ def evaluate(cfg: DictConfig) -> Path:
     agent: Agent | None = instantiate(cfg.baseline) if cfg.baseline._target_ else None
     if agent is None:
         raise UserError("baseline: 'none' cannot act; choose random_walk, greedy or oracle")
+    if agent.privileged != cfg.agent.privileged:
+        raise UserError(
+            f"agent.privileged: {cfg.agent.privileged}, but '{type(agent).__name__}' is "
+            f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
+        )
     folder = Path(cfg.outputs) / "eval" / run_folder_name(cfg)
     make_once(
         folder,
@@ -96,9 +101,11 @@ def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
     return EPISODES[cfg.episodes](room, list(pipeline.sound_files(cfg)), protocol, cfg.seed)
 
 
-def show(folder: Path) -> None:
+def show(cfg: DictConfig, folder: Path) -> None:
     """Print the table of a run's folder by room and sound, and how hard its episodes are."""
-    table.print_tables(pd.read_csv(folder / RESULTS), pd.read_csv(folder / EPISODE_RECORDS))
+    privileged = [cfg.agent.name] if cfg.agent.privileged else []
+    runs, episodes = pd.read_csv(folder / RESULTS), pd.read_csv(folder / EPISODE_RECORDS)
+    table.print_tables(runs, episodes, privileged=privileged)
 
 
 def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:

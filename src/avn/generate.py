@@ -27,7 +27,7 @@ def main(cfg: DictConfig) -> Path:
     if cfg.export is not None and cfg.export not in EXPORTS:
         raise UserError(f"export: '{cfg.export}' is none of {', '.join(EXPORTS)}")
     parts = [part for part, found in pipeline.plans(cfg).items() if found]
-    opened = pipeline.scenes(cfg, parts, audible=True)
+    opened = pipeline.scenes(cfg, parts, audible=True, asked=True)
     every = [which for part in parts for which in opened[part]]
     for which in every:
         save_floor_plan(which.plan, which.folder / "floor_plan.png", which.grid)

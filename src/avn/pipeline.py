@@ -24,12 +24,13 @@ from avn.acoustics.dry_sounds import BUILTIN, content_hash, load_sounds
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.splits import SplitConfig, load_split
 from avn.datamodules.sound import SoundData
-from avn.dataset import build, scene_file
+from avn.dataset import build, scene, scene_file
 from avn.dataset.scene import Scene
 from avn.errors import UserError
 from avn.modules import sound_training
 from avn.modules.hearing import hear
 from avn.modules.sound_cnn import SoundCnn
+from avn.reporting.results import ALL_SOUNDS
 from avn.stages import digest, make_once, stage_folder, written_whole
 
 # Raised when the code of a stage changes its result.
@@ -75,7 +76,7 @@ def scenes_folder(cfg: DictConfig) -> Path:
 
 
 def scenes(
-    cfg: DictConfig, parts: Sequence[str] = PARTS, audible: bool = False
+    cfg: DictConfig, parts: Sequence[str] = PARTS, audible: bool = False, asked: bool = False
 ) -> dict[str, list[Scene]]:
     """The scenes of some parts of the split, made where they are missing.
 
@@ -84,6 +85,8 @@ def scenes(
     parts : sequence of {"train", "validation", "test"}
     audible : bool
         Whether their impulse responses must be there too, in the regime of `acoustics`.
+    asked : bool
+        Whether it is them that the user asked for, so that `auto=false` does not refuse them.
 
     Raises
     ------
@@ -95,7 +98,15 @@ def scenes(
         if not found:
             raise UserError(f"split.{part}: split '{cfg.split.name}' has no {part} apartment")
     acoustics = acoustics_of(cfg)
+    if cfg.processes < 1:
+        raise UserError(f"processes: {cfg.processes} is less than 1; give 1 or more")
     folder = scenes_folder(cfg)
+    auto = cfg.auto or asked
+    for plan in (plan for found in chosen.values() for plan in found):
+        if not auto and not scene.geometry_file(folder / plan.name).is_file():
+            raise UserError(
+                f"{folder / plan.name}: scene is missing and auto=false; leave auto=true to make it"
+            )
     opened = {
         part: [build.build_geometry(plan, acoustics, folder / plan.name) for plan in found]
         for part, found in chosen.items()
@@ -108,7 +119,7 @@ def scenes(
             f"sound of the {', '.join(parts)} apartments of '{cfg.split.name}' ({acoustics.name})",
             done=lambda: build.acoustics_made(every, acoustics),
             make=lambda: build.build_acoustics(every, acoustics, cfg.processes),
-            auto=cfg.auto,
+            auto=auto,
             estimate=f"about {max(1, round(pairs * 0.02 / cfg.processes))} s",
         )
     return opened
@@ -120,8 +131,18 @@ def hears(cfg: DictConfig) -> bool:
 
 
 def sound_files(cfg: DictConfig) -> dict[str, str]:
-    """The node `sound`: name to built-in recording or path."""
-    return {str(name): str(path) for name, path in cfg.sound.items()}
+    """The node `sound`: name to built-in recording or path.
+
+    Raises
+    ------
+    UserError
+        For a name that tables and folders need for something else.
+    """
+    sounds = {str(name): str(path) for name, path in cfg.sound.items()}
+    for name in sounds:
+        if name == ALL_SOUNDS or "/" in name:
+            raise UserError(f"sound: '{name}' cannot be the name of a sound; rename it")
+    return sounds
 
 
 def model_hash(cfg: DictConfig) -> str:
@@ -140,8 +161,13 @@ def model_folder_name(cfg: DictConfig) -> str:
     return f"sound_cnn-{model_hash(cfg)[:8]}"
 
 
-def sound_model(cfg: DictConfig) -> tuple[SoundCnn, Path]:
+def sound_model(cfg: DictConfig, asked: bool = False) -> tuple[SoundCnn, Path]:
     """The trained sound network and its folder; trains it where it is missing.
+
+    Parameters
+    ----------
+    asked : bool
+        Whether it is the network that the user asked for, so that `auto=false` does not refuse it.
 
     Raises
     ------
@@ -158,7 +184,7 @@ def sound_model(cfg: DictConfig) -> tuple[SoundCnn, Path]:
         f"sound network '{cfg.sound_model.name}' ({cfg.acoustics.name})",
         done=(folder / METRICS).is_file,
         make=lambda: _fit(cfg, model, folder),
-        auto=cfg.auto,
+        auto=cfg.auto or asked,
         estimate="a few minutes",
     )
     return sound_training.load_weights(model, folder / sound_training.BEST), folder
@@ -177,6 +203,14 @@ def _fit(cfg: DictConfig, model: SoundCnn, folder: Path) -> None:
     metrics = sound_training.fit(data, model, folder)
     with written_whole(folder / METRICS) as part:
         part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+
+
+def hear_hash(cfg: DictConfig) -> str:
+    """Hash of what is heard, beside the apartment: network, sounds in their order, takes."""
+    if cfg.takes < 1:
+        raise UserError(f"takes: {cfg.takes} is less than 1; give 1 or more")
+    sounds = list(content_hash(sound_files(cfg)).items())
+    return digest(model_hash(cfg), sounds, cfg.takes, HEARING_SEED, VERSIONS["hear"])
 
 
 @dataclass(frozen=True)
@@ -198,15 +232,16 @@ def hearing(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
     list of (K, S, sounds, takes, 2) float32
         Metres to the right and to the front.
     """
-    model, folder = sound_model(cfg)
+    model, _ = sound_model(cfg)
     sounds = sound_files(cfg)
     ears = _Ears(model, sounds, cfg.acoustics.name, typed(cfg.microphone), cfg.takes)
     acoustics = acoustics_of(cfg)
-    made_from = digest(folder.name, content_hash(sounds), cfg.takes, VERSIONS["hear"])
+    made_from = hear_hash(cfg)
     target = stage_folder(cfg.outputs, "hear", "-".join(sounds), made_from)
     clips = sum(4 * s.grid.cells * len(s.sources) for s in chosen) * len(sounds) * cfg.takes
-    paths = [target / f"{which.name}.h5" for which in chosen]
     hashes = [digest(made_from, build.first_arrival_hash(s.plan, acoustics)) for s in chosen]
+    names = zip(chosen, hashes, strict=True)
+    paths = [target / f"{which.name}-{own[:8]}.h5" for which, own in names]
 
     def make() -> None:
         for which, path, own in zip(chosen, paths, hashes, strict=True):

@@ -20,7 +20,7 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
 from avn.reporting.results import AVERAGE, across_seeds, write_csv
-from avn.stages import digest, tell
+from avn.stages import digest, stage_folder, tell
 
 _RECORDS = "AVN_SWEEP_RECORDS"
 
@@ -37,10 +37,13 @@ def run_job(
 ) -> None:
     """Run one job of a sweep and record how it ended, so that a failure stops no other job."""
     job = HydraConfig.get().job
-    record: dict[str, Any] = {"overrides": job.override_dirname, "folder": None, "error": None}
+    overrides = list(HydraConfig.get().overrides.task)
+    record: dict[str, Any] = {"overrides": ", ".join(overrides), "folder": None, "error": None}
+    record["setting"] = ", ".join(o for o in overrides if not o.startswith("seed="))
     try:
         folder = task(cfg)
         record["folder"] = str(folder) if folder else None
+        record["outputs"] = str(cfg.outputs)
     except Exception as error:
         line = explain(error)
         if line is None:
@@ -53,18 +56,15 @@ def run_job(
 
 def end(name: str) -> int:
     """Print the mean and spread of a sweep and name the jobs that failed; give the exit code."""
-    folder = Path(os.environ.pop(_RECORDS))
+    folder = Path(os.environ[_RECORDS])
     records = [json.loads(path.read_text()) for path in sorted(folder.iterdir())]
-    shutil.rmtree(folder)
     failed = [record for record in records if record["error"]]
-    folders = list(dict.fromkeys(record["folder"] for record in records if record["folder"]))
-    results = [Path(folder) / "results.csv" for folder in folders]
-    results = [path for path in results if path.is_file()]
-    if results:
-        summary = across_seeds(pd.concat([pd.read_csv(path) for path in results]))
+    summary = _spread(records)
+    if len(summary):
         _print(summary)
-        # one folder a sweep, named by what it sums up
-        path = results[0].parents[2] / "sweeps" / digest(folders)[:8] / "results.csv"
+        outputs = Path(next(record["outputs"] for record in records if record["folder"]))
+        done = [Path(r["folder"]).relative_to(outputs).as_posix() for r in records if r["folder"]]
+        path = stage_folder(outputs, "eval", "sweeps/sweep", digest(done)) / "results.csv"
         write_csv(summary, path)
         if not failed:
             tell(str(path.parent))
@@ -75,11 +75,28 @@ def end(name: str) -> int:
     return max((record["code"] for record in failed), default=0)
 
 
+def forget() -> None:
+    """Remove the records of a sweep, however it ended."""
+    if folder := os.environ.pop(_RECORDS, None):
+        shutil.rmtree(folder)
+
+
+def _spread(records: list[dict[str, Any]]) -> pd.DataFrame:
+    """Mean and spread over the seeds, apart for jobs that differ in anything else."""
+    tables: dict[str, list[pd.DataFrame]] = {}
+    for record in records:
+        path = Path(record["folder"] or "") / "results.csv"
+        if record["folder"] and path.is_file():
+            tables.setdefault(record["setting"], []).append(pd.read_csv(path))
+    spreads = [across_seeds(pd.concat(runs)).assign(setting=key) for key, runs in tables.items()]
+    return pd.concat(spreads, ignore_index=True) if spreads else pd.DataFrame()
+
+
 def _print(summary: pd.DataFrame) -> None:
     for row in summary[summary["room"] == AVERAGE].to_dict("records"):
         figures = ", ".join(
             f"{figure.upper()} {100 * row[figure]:.1f} +- {100 * row[figure + '_std']:.1f} %"
             for figure in ("sr", "spl")
         )
-        labels = f"{row['agent']}, {row['sound']} ({row['protocol']}, {row['acoustics']})"
+        labels = f"{row['agent']}, {row['sound']} ({row['setting'] or 'defaults'})"
         tell(f"{labels}, {row['seeds']} seeds: {figures}")

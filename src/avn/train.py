@@ -16,7 +16,7 @@ from avn.stages import tell
 @command("train")
 def main(cfg: DictConfig) -> Path:
     """Train the model, or open it where it is trained, and print what was measured."""
-    _, folder = pipeline.sound_model(cfg)
+    _, folder = pipeline.sound_model(cfg, asked=True)
     metrics = json.loads((folder / pipeline.METRICS).read_text())
     for name in sorted(metrics):
         if name.startswith(("error_m/", "bearing_deg/")) and "/all" in name:

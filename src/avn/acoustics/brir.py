@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.acoustics import materials
+from avn.acoustics.dry_sounds import RATE
 from avn.acoustics.first_arrival import LOSS_TAPS, REGIMES, FirstArrivals, find_paths, render_paths
 from avn.acoustics.hrtf import load_sh_hrirs
 from avn.acoustics.rendering import Binaural, binaural_responses
@@ -37,6 +38,10 @@ class AcousticsConfig:
     seed: int = 0
 
 
+# What the names of the two regimes mean, wherever they stand.
+REGIME_OF = {"resonance": "through_walls", "diffraction": "round_corners"}
+
+
 def check_config(config: AcousticsConfig) -> AcousticsConfig:
     """The config itself, or a `UserError` that names the key and says what it may be."""
     if config.first_arrival not in REGIMES:
@@ -44,9 +49,14 @@ def check_config(config: AcousticsConfig) -> AcousticsConfig:
             f"acoustics.first_arrival: '{config.first_arrival}' is not known; "
             f"use {' or '.join(REGIMES)}"
         )
+    if REGIME_OF.get(config.name, config.first_arrival) != config.first_arrival:
+        raise UserError(
+            f"acoustics.first_arrival: '{config.first_arrival}' is not what the regime "
+            f"'{config.name}' means; give it a name of its own with acoustics.name=mine"
+        )
     limits: dict[str, tuple[float, float]] = {
         "seconds": (0.05, 10.0),
-        "rate": (8000, 48000),
+        "rate": (RATE, RATE),  # of clips and of what networks hear
         "rays": (100, 10_000_000),
         "depth": (1, 100_000),
         "receiver_radius": (0.01, 2.0),

@@ -30,7 +30,8 @@ from avn.dataset.scene import Scene
 from avn.progress import progress_bar
 from avn.stages import digest, written_whole
 
-# Raised when the code of a stage changes what it makes.
+# Raised when the code of a part changes what it makes. All enter every hash, for cells,
+# reverberation and first arrivals lie in one folder and must be of one making.
 MAKING = {"geometry": 1, "tail": 1, "first_arrival": 1}
 _REGIME = ("name", "first_arrival")
 
@@ -38,19 +39,19 @@ _REGIME = ("name", "first_arrival")
 def geometry_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
     """Hash of what a geometry file is made from."""
     heights = (acoustics.ear_height, acoustics.source_height)
-    return digest(plan.to_dict(), heights, MAKING["geometry"])
+    return digest(plan.to_dict(), heights, MAKING)
 
 
 def tail_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
     """Hash of what the traced reverberation is made from; the regime is no part of it."""
     settings = {key: value for key, value in asdict(acoustics).items() if key not in _REGIME}
-    return digest(plan.to_dict(), settings, brir.assets_hash(), MAKING["tail"])
+    return digest(plan.to_dict(), settings, brir.assets_hash(), MAKING)
 
 
 def first_arrival_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
     """Hash of what the first arrivals of a regime are made from."""
     regime = [getattr(acoustics, key) for key in _REGIME]
-    return digest(tail_hash(plan, acoustics), regime, MAKING["first_arrival"])
+    return digest(tail_hash(plan, acoustics), regime)
 
 
 def build_geometry(plan: FloorPlan, acoustics: AcousticsConfig, folder: Path) -> Scene:
@@ -121,16 +122,24 @@ def _render_first_arrivals(job: _Job) -> FirstArrivals:
 
 
 def acoustics_made(scenes: Sequence[Scene], acoustics: AcousticsConfig) -> bool:
-    """Whether all files of a regime are there; whether they are whole shows on reading."""
-    return all(_tail_made(s) and _first_made(s, acoustics) for s in scenes)
+    """Whether all files of a regime are there; whether they are whole shows on reading.
+
+    Raises
+    ------
+    UserError
+        Where a file was made from other settings.
+    """
+    return all(_tail_made(s, acoustics) and _first_made(s, acoustics) for s in scenes)
 
 
-def _tail_made(which: Scene) -> bool:
-    return scene.tail_file(which.folder).is_file()
+def _tail_made(which: Scene, acoustics: AcousticsConfig) -> bool:
+    path = scene.tail_file(which.folder)
+    return scene_file.is_there(path, tail_hash(which.plan, acoustics))
 
 
 def _first_made(which: Scene, acoustics: AcousticsConfig) -> bool:
-    return scene.first_arrival_file(which.folder, acoustics.name).is_file()
+    path = scene.first_arrival_file(which.folder, acoustics.name)
+    return scene_file.is_there(path, first_arrival_hash(which.plan, acoustics))
 
 
 def build_acoustics(scenes: Sequence[Scene], acoustics: AcousticsConfig, processes: int) -> None:
@@ -138,7 +147,7 @@ def build_acoustics(scenes: Sequence[Scene], acoustics: AcousticsConfig, process
 
     The results do not depend on the number of processes.
     """
-    missing = [which for which in scenes if not _tail_made(which)]
+    missing = [which for which in scenes if not _tail_made(which, acoustics)]
     jobs = {which.name: _jobs(which, acoustics) for which in missing}
     todo = [job for name in jobs for job in jobs[name] if not job.part.is_file()]
     total = sum(len(job.cells) for which in jobs.values() for job in which)
@@ -182,7 +191,6 @@ def _assemble_tail(which: Scene, acoustics: AcousticsConfig, jobs: list[_Job]) -
     pairs = (len(jobs), which.grid.cells)
 
     def fill(file: h5py.File) -> None:
-        file.attrs["rate"] = acoustics.rate
         samples = round(acoustics.seconds * acoustics.rate)
         shape = (*pairs, 4, 2, samples)
         file.create_dataset("samples", shape, np.int16)  # contiguous, to be memory-mapped

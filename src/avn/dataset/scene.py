@@ -63,7 +63,7 @@ class Brirs:
     Attributes
     ----------
     samples : int
-        Length T of a response, at `rate` samples a second.
+        Length T of a response, at 16 kHz.
     """
 
     def __init__(
@@ -80,10 +80,8 @@ class Brirs:
         if first_marks["tail_made_from"] != marks["made_from"]:
             raise UserError(f"{path}: belongs to another acoustics-tail.h5; make the scene again")
         self._onset = torch.from_numpy(first_marks["onset"].astype(np.int64))
-        self.rate = int(marks["rate"])
         self.samples = int(self._tail.shape[-1])
         self.cut_db: NDArray[np.float32] = marks["cut_db"]
-        self.made_from = str(first_marks["made_from"])
 
     def gather(self, source: torch.Tensor, state: torch.Tensor) -> torch.Tensor:
         """Impulse responses of N pairs.

@@ -52,7 +52,9 @@ class Episodes:
     def keys(self) -> NDArray[np.uint64]:
         """The key of each episode's random numbers, (N,); the same for every agent."""
         room = np.uint64(derive("episode", self.seed, self.room))
-        return scramble(scramble(scramble(room, self.source), self.start), self.sound)
+        # by its name, so that a sound is heard alike whichever others are beside it
+        names = np.array([derive("sound", name) for name in self.sounds], dtype=np.uint64)
+        return scramble(scramble(scramble(room, self.source), self.start), names[self.sound])
 
 
 def frozen_episodes(

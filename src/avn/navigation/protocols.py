@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from omegaconf import MISSING
 
 from avn.apartments.floor_plan import CELL
-from avn.apartments.grid import Grid
+from avn.apartments.grid import Grid, goal_cells
 from avn.errors import UserError
 from avn.navigation.actions import STOP
 
@@ -96,10 +96,8 @@ class Protocol:
 
     def goal_cells(self, grid: Grid, sources: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Where an agent succeeds, (K, C)."""
-        moves = grid.distances[sources].astype(np.int64)
         if self.goal == "radius":
             # A cell that is exactly 1 m away is within 1 m, whatever the rounding.
-            return moves * CELL <= self.radius + 1e-9
-        offset = np.abs(grid.lattice[None, :, :] - grid.lattice[sources][:, None, :])
-        near: NDArray[np.bool_] = (offset.max(axis=-1) <= 1) & (moves <= 2)
+            return grid.distances[sources].astype(np.int64) * CELL <= self.radius + 1e-9
+        near: NDArray[np.bool_] = goal_cells(grid)[sources]
         return near

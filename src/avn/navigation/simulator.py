@@ -144,7 +144,7 @@ class Simulator:
             in the frame of the start; with hearing also `sound` (N, D).
         """
         odometry = self._seen_from[self._frame + self.state] - self._origin
-        observation = {"collided": self._collided, "odometry": odometry}
+        observation = {"collided": self._collided.clone(), "odometry": odometry}
         if self._hearing is not None:
             observation["sound"] = self._hearing[self._clip()]
         return TensorDict(observation, batch_size=[len(self)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from importlib import resources
 
 import numpy as np
@@ -26,12 +27,12 @@ def paper_table() -> pd.DataFrame:
         return pd.read_csv(lines)
 
 
-def results_table(results: pd.DataFrame) -> Table:
+def results_table(results: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
     """Success rate / SPL in %, a row for each agent and sound and a column for each room.
 
     Under each row stands the paper's own where it has one, which is under its own protocol `var`
     alone; its `all` is the mean over its sounds.
-    Figures of several seeds are averaged.
+    Figures of several seeds are averaged. Agents named in `privileged` are marked as such.
     """
     rooms = list(dict.fromkeys(results["room"]))
     table = Table(title="success rate / SPL, %", box=None, pad_edge=False, title_justify="left")
@@ -42,7 +43,8 @@ def results_table(results: pd.DataFrame) -> Table:
     columns = ["agent", "protocol", "acoustics", "look"]
     for keys, run in results.groupby(columns, sort=False):
         names = [str(key) for key in keys]
-        table.add_row(f"[bold]{' · '.join(names)}[/bold]")
+        mark = " (privileged: a bound)" if names[0] in privileged else ""
+        table.add_row(f"[bold]{' · '.join(names)}{mark}[/bold]")
         for sound, part in run.groupby("sound", sort=False):
             means = 100.0 * part.groupby("room", sort=False)[["sr", "spl"]].mean()
             cells = [_cell(*row) for row in means.reindex(rooms).to_numpy()]
@@ -97,11 +99,14 @@ def hardness_table(episodes: pd.DataFrame) -> Table:
 
 
 def print_tables(
-    results: pd.DataFrame, episodes: pd.DataFrame, console: Console | None = None
+    results: pd.DataFrame,
+    episodes: pd.DataFrame,
+    console: Console | None = None,
+    privileged: Collection[str] = (),
 ) -> None:
     """Print the results and how hard the starts are."""
     console = console or _console()
-    for table in (results_table(results), hardness_table(episodes)):
+    for table in (results_table(results, privileged), hardness_table(episodes)):
         console.print(table)
         console.print()
 
