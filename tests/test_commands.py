@@ -89,6 +89,39 @@ def test_a_failing_job_is_named_and_the_others_run(command, outputs):
     assert any("1 seeds: SR" in line for line in out)
 
 
+def test_a_sound_that_is_missing_fails_its_own_job_alone(command, outputs):
+    code, out, err = command(
+        "eval",
+        "agent=random_walk",
+        "split=mini",
+        f"outputs={outputs}",
+        "sound=nosuch.wav,alarm",
+        "seed=0",
+        "-m",
+    )
+    assert code == 2
+    assert any("failed: " in line and "nosuch.wav" in line for line in err)
+    assert "1 of 2 jobs failed" in err[-1]
+    assert any(line.startswith("random_walk, alarm") for line in out)
+
+
+def test_a_sweep_keeps_unlike_runs_apart(command, outputs):
+    code, out, err = command(
+        "eval",
+        "agent=random_walk",
+        "split=mini",
+        f"outputs={outputs}",
+        "sound=alarm",
+        "protocol.starts=5,10",
+        "seed=0,1",
+        "-m",
+    )
+    assert code == 0, err
+    lines = [line for line in out if line.startswith("random_walk, alarm (")]
+    assert len(lines) == 2
+    assert all("2 seeds" in line for line in lines)
+
+
 def test_any_audio_file_is_a_sound(command, outputs, tmp_path):
     tone = 0.1 * np.sin(2 * np.pi * 500 * np.arange(4410) / 44100)
     soundfile.write(tmp_path / "my tone.wav", np.column_stack([tone, tone]), 44100)

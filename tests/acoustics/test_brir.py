@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from avn.acoustics import materials
 from avn.acoustics.band_filters import HALF, band_firs, band_weights, minimum_phase
 from avn.acoustics.brir import (
     AcousticsConfig,
@@ -263,6 +264,9 @@ def test_a_value_out_of_range_is_named(key: str, value: object) -> None:
     assert check_config(CONFIG) is CONFIG
 
 
-def test_the_hash_of_the_tables_stays_the_same() -> None:
-    assert assets_hash() == assets_hash()
-    assert len(assets_hash()) == 64
+def test_the_hash_of_the_tables_follows_what_they_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = assets_hash()
+    assert assets_hash() == before
+    louder = materials.absorption(materials.NAMES) * 0.99
+    monkeypatch.setattr(materials, "absorption", lambda names: louder)
+    assert assets_hash() != before

@@ -1,0 +1,50 @@
+"""The frozen benchmark, walked: as hard as the paper's, and solvable."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from avn.acoustics.brir import AcousticsConfig
+from avn.agents.oracle import Oracle
+from avn.agents.random_walk import RandomWalk
+from avn.apartments.splits import SplitConfig, load_split
+from avn.dataset.build import build_geometry
+from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
+from avn.navigation.protocols import Protocol
+from avn.navigation.run import Labels, walk_room
+from avn.reporting.results import headline, summarise
+
+PROTOCOLS = {
+    "var": Protocol("var", goal="box", says_stop=False, path="attempted", moves_factor=2.0),
+    "var_stop": Protocol("var_stop", goal="box", says_stop=True, path="attempted", moves_factor=2),
+    "stop": Protocol("stop", goal="radius", says_stop=True, path="walked"),
+}
+
+
+@pytest.fixture(scope="module")
+def rooms(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("var")
+    plans = load_split(SplitConfig(folder="var"))["test"]
+    return [build_geometry(plan, AcousticsConfig(), folder / plan.name) for plan in plans]
+
+
+def walked(agent, rooms, protocol, episodes):
+    labels = Labels(agent="agent", acoustics="resonance")
+    records = [
+        walk_room(agent, room, episodes(room, ["ring"], protocol, 0), protocol, labels)
+        for room in rooms
+    ]
+    return headline(summarise(pd.concat(records, ignore_index=True), draws=10))
+
+
+def test_random_search_is_as_in_the_paper(rooms):
+    figures = walked(RandomWalk(), rooms, PROTOCOLS["var"], exhaustive_episodes)
+    assert 100 * figures["sr"] == pytest.approx(7.1, abs=1.5)
+    assert 100 * figures["spl"] == pytest.approx(4.3, abs=1.0)
+
+
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_the_oracle_never_fails_and_never_walks_too_far(rooms, name):
+    figures = walked(Oracle(), rooms, PROTOCOLS[name], frozen_episodes)
+    found = np.array([figures["sr"], figures["spl"], figures["sna"]])
+    np.testing.assert_allclose(found, 1.0)

@@ -1,0 +1,98 @@
+"""Which settings enter which hash: what changes a result must, machine settings must not."""
+
+import pytest
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from hydra.utils import instantiate
+
+from avn import cli, config, evaluation, pipeline
+from avn.dataset import build
+
+NONE, RUN, HEARD, TRAINED = (), ("run",), ("run", "heard"), ("run", "heard", "trained")
+EVERY = ("run", "heard", "trained", "scenes")
+
+
+@pytest.fixture(scope="module")
+def composed():
+    config.register()
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(cli.conf_folder()), version_base="1.3"):
+        yield lambda *overrides: compose(
+            "eval", overrides=["agent=greedy", "split=mini", *overrides]
+        )
+
+
+def hashes(cfg):
+    return {
+        "run": evaluation.run_hash(cfg),
+        "heard": pipeline.hear_hash(cfg),
+        "trained": pipeline.model_hash(cfg),
+        "scenes": pipeline.scenes_folder(cfg).name,
+    }
+
+
+def moved(before, after):
+    return {key for key in before if before[key] != after[key]}
+
+
+@pytest.mark.parametrize(
+    ("override", "wanted"),
+    [
+        ("outputs=elsewhere", NONE),
+        ("processes=1", NONE),
+        ("auto=false", NONE),
+        ("seed=5", RUN),
+        ("episodes=exhaustive", RUN),
+        ("protocol=stop", RUN),
+        ("protocol.starts=5", RUN),
+        ("baseline.patience=2", RUN),
+        ("sound=alarm", HEARD),
+        ("takes=2", HEARD),
+        ("sound_model.epochs=3", TRAINED),
+        ("sound_model.train_seed=3", TRAINED),
+        ("sound_model.spectrogram.bands=32", TRAINED),
+        ("microphone.noise_rms=0.1", TRAINED),
+        # the regimes share the scene folder, for they share the reverberation
+        ("acoustics=diffraction", TRAINED),
+        ("acoustics.rays=500", EVERY),
+        ("acoustics.seconds=0.3", EVERY),
+        ("acoustics.ear_height=1.4", EVERY),
+        ("split.seed=9", EVERY),
+    ],
+)
+def test_a_setting_enters_the_hashes_of_what_it_changes(composed, override, wanted):
+    assert moved(hashes(composed()), hashes(composed(override))) == set(wanted)
+
+
+@pytest.mark.parametrize(
+    ("versions", "name", "wanted"),
+    [
+        (pipeline.VERSIONS, "hear", HEARD),
+        (pipeline.VERSIONS, "sound_cnn", TRAINED),
+        (build.MAKING, "geometry", EVERY),
+        (build.MAKING, "tail", EVERY),
+        (build.MAKING, "first_arrival", EVERY),
+    ],
+)
+def test_a_raised_version_makes_anew_what_depends_on_it(
+    composed, monkeypatch, versions, name, wanted
+):
+    before = hashes(composed())
+    monkeypatch.setitem(versions, name, versions[name] + 1)
+    assert moved(before, hashes(composed())) == set(wanted)
+
+
+def test_sounds_are_told_apart_by_their_order(composed):
+    one = composed("sound=[ring,alarm]")
+    other = composed("sound=[alarm,ring]")
+    assert pipeline.hear_hash(one) != pipeline.hear_hash(other)
+
+
+@pytest.mark.parametrize(
+    "row", sorted(path.stem for path in (cli.conf_folder() / "agent").glob("*.yaml"))
+)
+def test_only_rows_that_say_so_are_shown_the_truth(composed, row):
+    cfg = composed(f"agent={row}")
+    agent = instantiate(cfg.baseline)
+    assert agent.privileged == cfg.agent.privileged == (row == "oracle")
+    assert "sound" not in agent.needs or pipeline.hears(cfg)
