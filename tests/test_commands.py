@@ -11,6 +11,8 @@ import pytest
 import soundfile
 import torch
 
+from avn.apartments.splits import FROZEN
+
 SMALL = (
     "split=mini",
     "processes=1",
@@ -255,3 +257,57 @@ def test_reproduce_runs_the_rows_that_are_named(command, outputs):
     best = results[(results["agent"] == "oracle") & (results["room"] == "average")]
     assert best["sr"].to_numpy() == pytest.approx(1)
     assert best["spl"].to_numpy() == pytest.approx(1)
+
+
+def test_sounds_may_be_a_list_with_paths(command, outputs, tmp_path):
+    soundfile.write(tmp_path / "tone.wav", np.sin(np.arange(16000)), 16000)
+    sounds = f"sound=[ring,{tmp_path / 'tone.wav'}]"
+    code, out, err = command(
+        "eval", "agent=random_walk", "split=mini", f"outputs={outputs}", sounds
+    )
+    assert code == 0, err
+    assert set(pd.read_csv(Path(out[-1]) / "results.csv")["sound"]) == {"ring", "tone", "all"}
+
+
+@pytest.mark.parametrize("name", ["episodes.csv", "results.csv"])
+@pytest.mark.parametrize("spoil", [_cut, lambda path: path.write_text("")], ids=["cut", "empty"])
+def test_a_damaged_run_is_one_line(command, outputs, tmp_path, name, spoil):
+    _, out, _ = run_greedy(command, outputs, "sound=alarm")
+    mine = copy(outputs, tmp_path)
+    folder = mine / Path(out[-1]).relative_to(outputs)
+    spoil(folder / name)
+    code, _, err = run_greedy(command, mine, "sound=alarm")
+    assert code == 2
+    assert str(folder) in err[-1]
+    assert "damaged; delete the folder" in err[-1]
+
+
+def test_a_bit_of_a_checkpoint_that_flipped_is_one_line(command, outputs, tmp_path):
+    mine = copy(outputs, tmp_path)
+    shutil.rmtree(mine / "hear")
+    shutil.rmtree(mine / "eval")
+    (path,) = mine.glob("train/*/best.ckpt")
+    _flip(path)
+    code, _, err = run_greedy(command, mine, "sound=alarm")
+    assert code == 2
+    assert str(path) in err[-1]
+    assert "to train again" in err[-1]
+
+
+def test_a_refused_run_leaves_nothing_behind(command, tmp_path):
+    for mistake in ("agent.name=../../esc", "seed=-1", "takes=0", "sound=nosuch.wav"):
+        code, _, err = run_greedy(command, tmp_path / "o", mistake)
+        assert code == 2, err
+        assert len(err) == 1
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_an_unknown_material_is_refused_before_anything_is_traced(command, tmp_path):
+    plans = Path(shutil.copytree(FROZEN / "var", tmp_path / "plans"))
+    room = plans / "room_1.json"
+    room.write_text(room.read_text().replace('"parquet"', '"cheese"', 1))
+    code, _, err = command("generate", f"split.folder={plans}", f"outputs={tmp_path}/o")
+    assert code == 2
+    assert len(err) == 1
+    assert "room_1" in err[0]
+    assert "cheese" in err[0]

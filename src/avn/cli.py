@@ -119,7 +119,7 @@ def arrange(arguments: Iterable[str]) -> list[str]:
     groups = _groups()
     for argument in arguments:
         key, equals, value = argument.partition("=")
-        if key in groups and equals and value in ("", "null"):
+        if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
             raise UserError(f"{argument}: name an option, such as 'none'; there are {groups[key]}")
         if argument in ("-m", "--multirun"):
             sweep = ["--multirun"]
@@ -183,6 +183,7 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
 
 def _one_line(text: str) -> str:
     text = text.split("Config search path:")[0]
+    text = re.sub(r"To append to your config use \S+", "", text)  # which is refused too
     text = re.sub(r"\s+\w*schema\b", "", text)  # the dataclasses stand among the options
     text = re.sub(r"\s*(full_key|object_type|reference_type)[:=]\s*\S*", "", text)
     return " ".join(text.split())

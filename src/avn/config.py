@@ -1,4 +1,4 @@
-"""What Hydra must know before it composes: the schema of each group and our resolvers.
+"""What Hydra must know before it composes: the schema of each group.
 
 Each group's node has a dataclass that stands beside the code it configures, so that a misspelt
 key or a wrong type is refused with its name.
@@ -6,19 +6,16 @@ key or a wrong type is refused with its name.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from hydra.core.config_store import ConfigStore
-from hydra.types import RunMode
-from omegaconf import MISSING, DictConfig, OmegaConf
+from omegaconf import MISSING
 
 from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.clips import MicrophoneConfig
 from avn.agents.base import BaselineConfig
 from avn.agents.greedy import GreedyConfig
 from avn.apartments.splits import SplitConfig
-from avn.errors import UserError
 from avn.modules.sound_cnn import SoundModelConfig
 from avn.navigation.protocols import ProtocolConfig
 
@@ -108,33 +105,9 @@ SCHEMAS = {
 
 
 def register() -> None:
-    """Store the schemas and register the resolvers; may be called again."""
+    """Store the schemas; may be called again."""
     store = ConfigStore.instance()
     for (group, name), schema in SCHEMAS.items():
         store.store(group=group, name=name, node=schema)
     for command, schema in COMMANDS.items():
         store.store(name=f"{command}_schema", node=schema)
-    OmegaConf.register_new_resolver("run_dir", _run_dir, replace=True)
-    OmegaConf.register_new_resolver("model_dir", _model_dir, replace=True)
-
-
-def _run_dir(*, _root_: DictConfig) -> str:
-    from avn import evaluation
-
-    return _named_or_refused(evaluation.run_folder_name, _root_)
-
-
-def _model_dir(*, _root_: DictConfig) -> str:
-    from avn import pipeline
-
-    return _named_or_refused(pipeline.model_folder_name, _root_)
-
-
-def _named_or_refused(name: Callable[[DictConfig], str], root: DictConfig) -> str:
-    """The name of a folder; a job of a sweep that cannot be named fails by itself, later."""
-    try:
-        return name(root)
-    except UserError:
-        if root.hydra.mode != RunMode.MULTIRUN:
-            raise
-        return "refused"

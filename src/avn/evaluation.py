@@ -7,11 +7,11 @@ from typing import Any
 
 import pandas as pd
 from hydra.utils import instantiate
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 from torch.utils.tensorboard import SummaryWriter
 
 from avn import pipeline
-from avn.acoustics.dry_sounds import content_hash
+from avn.acoustics.dry_sounds import content_hash, load_sounds
 from avn.agents.base import Agent
 from avn.dataset import build
 from avn.dataset.scene import Scene
@@ -20,7 +20,7 @@ from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episod
 from avn.navigation.protocols import Protocol
 from avn.navigation.run import Labels, walk_room
 from avn.reporting import results, table
-from avn.stages import digest, make_once
+from avn.stages import check_name, digest, make_once, written_whole
 
 # Raised when the code of simulator, agents or metrics changes a record.
 VERSION = 1
@@ -41,6 +41,7 @@ def run_hash(cfg: DictConfig) -> str:
 def run_folder_name(cfg: DictConfig) -> str:
     """`<agent>/<sounds>/seed<seed>-<hash8>`: the folder of a run under `outputs/eval`."""
     sounds = "-".join(pipeline.sound_files(cfg))
+    check_name("agent.name", cfg.agent.name)
     return f"{cfg.agent.name}/{sounds}/seed{cfg.seed}-{run_hash(cfg)[:8]}"
 
 
@@ -57,6 +58,8 @@ def evaluate(cfg: DictConfig) -> Path:
     UserError
         Where an option cannot work, or something it needs is missing and `auto` is false.
     """
+    if not 0 <= cfg.seed < 2**62:
+        raise UserError(f"seed: {cfg.seed} is out of range; give 0 or more")
     if cfg.episodes not in EPISODES:
         raise UserError(f"episodes: '{cfg.episodes}' is none of {', '.join(EPISODES)}")
     protocol: Protocol = instantiate(cfg.protocol)
@@ -68,6 +71,7 @@ def evaluate(cfg: DictConfig) -> Path:
             f"agent.privileged: {cfg.agent.privileged}, but '{type(agent).__name__}' is "
             f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
         )
+    load_sounds(pipeline.sound_files(cfg))  # a bad file is refused before anything is made
     folder = Path(cfg.outputs) / "eval" / run_folder_name(cfg)
     make_once(
         folder,
@@ -92,6 +96,8 @@ def _walk(cfg: DictConfig, agent: Agent, protocol: Protocol, folder: Path) -> No
     episodes = pd.concat(walked, ignore_index=True)
     summary = results.summarise(episodes)
     _log(cfg, folder, summary)
+    with written_whole(folder / "config.yaml") as part:
+        OmegaConf.save(cfg, part, resolve=True)
     results.write_csv(episodes, folder / EPISODE_RECORDS)
     results.write_csv(summary, folder / RESULTS)
 
@@ -101,10 +107,26 @@ def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
     return EPISODES[cfg.episodes](room, list(pipeline.sound_files(cfg)), protocol, cfg.seed)
 
 
+def read(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Results and episodes of a finished run.
+
+    Raises
+    ------
+    UserError
+        Where a file is missing, cannot be read, or the results are not those of the episodes.
+    """
+    try:
+        runs, episodes = pd.read_csv(folder / RESULTS), pd.read_csv(folder / EPISODE_RECORDS)
+        pd.testing.assert_frame_equal(runs, results.summarise(episodes))
+    except (OSError, ValueError, KeyError, AssertionError, UserError) as error:
+        raise UserError(f"{folder}: the run is damaged; delete the folder and run again") from error
+    return runs, episodes
+
+
 def show(cfg: DictConfig, folder: Path) -> None:
     """Print the table of a run's folder by room and sound, and how hard its episodes are."""
     privileged = [cfg.agent.name] if cfg.agent.privileged else []
-    runs, episodes = pd.read_csv(folder / RESULTS), pd.read_csv(folder / EPISODE_RECORDS)
+    runs, episodes = read(folder)
     table.print_tables(runs, episodes, privileged=privileged)
 
 

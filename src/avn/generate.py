@@ -26,6 +26,8 @@ def main(cfg: DictConfig) -> Path:
     """Make all scenes of the split, draw their floor plans, and export what is asked for."""
     if cfg.export is not None and cfg.export not in EXPORTS:
         raise UserError(f"export: '{cfg.export}' is none of {', '.join(EXPORTS)}")
+    if cfg.export is None and (cfg.clips or cfg.apartments):
+        raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
     parts = [part for part, found in pipeline.plans(cfg).items() if found]
     opened = pipeline.scenes(cfg, parts, audible=True, asked=True)
     every = [which for part in parts for which in opened[part]]

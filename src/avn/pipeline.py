@@ -31,15 +31,23 @@ from avn.modules import sound_training
 from avn.modules.hearing import hear
 from avn.modules.sound_cnn import SoundCnn
 from avn.reporting.results import ALL_SOUNDS
-from avn.stages import digest, make_once, stage_folder, written_whole
+from avn.stages import (
+    check_name,
+    digest,
+    file_hash,
+    make_once,
+    stage_folder,
+    written_whole,
+)
 
 # Raised when the code of a stage changes its result.
 VERSIONS = {"sound_cnn": 1, "hear": 1}
 # What networks are trained on, whatever `sound=` says.
 TRAINING_SOUNDS = {name: name for name in BUILTIN}
-METRICS = "metrics.json"
+METRICS, CHECKSUM = "metrics.json", "best.ckpt sha256"
 # Draws the takes of what is heard; an episode draws among them from its own seed.
 HEARING_SEED = 0
+MOST_TAKES = 1000
 PARTS = ("train", "validation", "test")
 
 
@@ -98,6 +106,10 @@ def scenes(
         if not found:
             raise UserError(f"split.{part}: split '{cfg.split.name}' has no {part} apartment")
     acoustics = acoustics_of(cfg)
+    check_name("split.name", cfg.split.name)
+    check_name("acoustics.name", cfg.acoustics.name)
+    if not cfg.outputs:
+        raise UserError("outputs: empty; give the path of a folder")
     if cfg.processes < 1:
         raise UserError(f"processes: {cfg.processes} is less than 1; give 1 or more")
     folder = scenes_folder(cfg)
@@ -140,8 +152,9 @@ def sound_files(cfg: DictConfig) -> dict[str, str]:
     """
     sounds = {str(name): str(path) for name, path in cfg.sound.items()}
     for name in sounds:
-        if name == ALL_SOUNDS or "/" in name:
-            raise UserError(f"sound: '{name}' cannot be the name of a sound; rename it")
+        check_name("sound", name)
+        if name == ALL_SOUNDS:
+            raise UserError(f"sound: '{name}' is the row of all sounds; rename it")
     return sounds
 
 
@@ -187,7 +200,19 @@ def sound_model(cfg: DictConfig, asked: bool = False) -> tuple[SoundCnn, Path]:
         auto=cfg.auto or asked,
         estimate="a few minutes",
     )
-    return sound_training.load_weights(model, folder / sound_training.BEST), folder
+    best = folder / sound_training.BEST
+    sound_training.load_weights(model, best)
+    if read_metrics(folder).get(CHECKSUM) != file_hash(best):
+        raise UserError(f"{best}: changed since it was trained; delete {folder} to train again")
+    return model, folder
+
+
+def read_metrics(folder: Path) -> dict[str, Any]:
+    """What a training measured; raises `UserError` where the file is damaged."""
+    try:
+        return dict(json.loads((folder / METRICS).read_text()))
+    except (OSError, ValueError) as error:
+        raise UserError(f"{folder / METRICS}: damaged; delete {folder} to train again") from error
 
 
 def _fit(cfg: DictConfig, model: SoundCnn, folder: Path) -> None:
@@ -201,14 +226,15 @@ def _fit(cfg: DictConfig, model: SoundCnn, folder: Path) -> None:
         typed(cfg.sound_model),
     )
     metrics = sound_training.fit(data, model, folder)
+    metrics[CHECKSUM] = file_hash(folder / sound_training.BEST)
     with written_whole(folder / METRICS) as part:
         part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
 
 
 def hear_hash(cfg: DictConfig) -> str:
     """Hash of what is heard, beside the apartment: network, sounds in their order, takes."""
-    if cfg.takes < 1:
-        raise UserError(f"takes: {cfg.takes} is less than 1; give 1 or more")
+    if not 1 <= cfg.takes <= MOST_TAKES:
+        raise UserError(f"takes: {cfg.takes} is out of range; give 1 to {MOST_TAKES}")
     sounds = list(content_hash(sound_files(cfg)).items())
     return digest(model_hash(cfg), sounds, cfg.takes, HEARING_SEED, VERSIONS["hear"])
 

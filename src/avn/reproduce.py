@@ -30,8 +30,8 @@ def main(cfg: DictConfig) -> Path:
     pipeline.scenes(cfg, parts, audible=True, asked=True)
     configs = [own for row in cfg.rows for own in _runs(cfg, row)]
     folders = [evaluation.evaluate(own) for own in configs]
-    runs = pd.concat([pd.read_csv(folder / evaluation.RESULTS) for folder in folders])
-    episodes = [pd.read_csv(folder / evaluation.EPISODE_RECORDS) for folder in folders]
+    tables, episodes = zip(*map(evaluation.read, folders), strict=True)
+    runs = pd.concat(tables)
     privileged = {own.agent.name for own in configs if own.agent.privileged}
     table.print_tables(runs, episodes[0], privileged=privileged)
     _compare(pd.concat(episodes), [own.agent.name for own in configs])

@@ -50,7 +50,8 @@ class AudioFiles(ConfigSource):
             provider=self.provider,
             path=self.full_path(),
             config=OmegaConf.create({Path(path).stem: path}),
-            header={"package": None},
+            # without it, the folders of the path would become keys
+            header={"package": "sound"},
         )
 
     def is_group(self, config_path: str) -> bool:

@@ -29,6 +29,11 @@ def digest(*parts: Any) -> str:
     return hashlib.sha256(canonical(parts).encode()).hexdigest()
 
 
+def file_hash(path: Path) -> str:
+    """SHA-256, in hex, of a file's bytes."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
 def canonical(value: Any) -> str:
     """The one JSON text of a value, on which `digest` is computed."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
@@ -47,6 +52,12 @@ def _plain(value: Any) -> Any:
 def stage_folder(outputs: str | Path, stage: str, what: str, made_from: str) -> Path:
     """`outputs/<stage>/<what>-<hash8>`."""
     return Path(outputs) / stage / f"{what}-{made_from[:8]}"
+
+
+def check_name(option: str, name: str) -> None:
+    """Refuse a name that would lead a folder astray; raises `UserError` with the option."""
+    if not name or name.startswith(".") or "/" in name or "\0" in name:
+        raise UserError(f"{option}: '{name}' cannot name a folder; use letters, digits, - and _")
 
 
 def make_once(
@@ -96,7 +107,7 @@ def locked(folder: Path, what: str) -> Iterator[None]:
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UserError(f"{folder.parent}: {error.strerror}; choose outputs=FOLDER") from error
+        raise UserError(f"outputs: {folder.parent}: {error.strerror}; choose another") from error
     lock = FileLock(folder.parent / f".{folder.name}.lock")
     try:
         lock.acquire(timeout=0)

@@ -95,7 +95,8 @@ def _spread(records: list[dict[str, Any]]) -> pd.DataFrame:
 def _print(summary: pd.DataFrame) -> None:
     for row in summary[summary["room"] == AVERAGE].to_dict("records"):
         figures = ", ".join(
-            f"{figure.upper()} {100 * row[figure]:.1f} +- {100 * row[figure + '_std']:.1f} %"
+            f"{figure.upper()} {100 * row[figure]:.1f}"
+            + (f" +- {100 * row[figure + '_std']:.1f} %" if row["seeds"] > 1 else " %")
             for figure in ("sr", "spl")
         )
         labels = f"{row['agent']}, {row['sound']} ({row['setting'] or 'defaults'})"

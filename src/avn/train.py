@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from avn.stages import tell
 def main(cfg: DictConfig) -> Path:
     """Train the model, or open it where it is trained, and print what was measured."""
     _, folder = pipeline.sound_model(cfg, asked=True)
-    metrics = json.loads((folder / pipeline.METRICS).read_text())
+    metrics = pipeline.read_metrics(folder)
     for name in sorted(metrics):
         if name.startswith(("error_m/", "bearing_deg/")) and "/all" in name:
             tell(f"{name}: {metrics[name]:.2f}")

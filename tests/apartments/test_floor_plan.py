@@ -43,8 +43,10 @@ def change(data: dict[str, Any], part: str, key: str, value: object) -> None:
     [
         ("rooms", "kind", "hall", "room kind 'hall' is none of kitchen"),
         ("rooms", "x0", 0.3, "are not on the 0.5 m lattice"),
-        ("rooms", "x0", "west", "not a floor plan"),
-        ("rooms", "colour", "red", "not a floor plan"),
+        ("furniture", "width", -1.0, "has no size"),
+        ("furniture", "x", 1e9, "'x' is 1000000000.0"),
+        ("rooms", "x0", "west", "'x0' is 'west', which is no float"),
+        ("rooms", "colour", "red", "unknown key 'colour'"),
         ("doorways", "along", "z", "'along' is 'z', not 'x' or 'y'"),
         ("doorways", "x", 1.21, "is not centred on the 0.5 m lattice"),
         ("furniture", "heading", 4, "is 4, not 0 to 3"),

@@ -133,9 +133,9 @@ def test_a_folder_without_a_part_is_named(tmp_path: Path, files: str, part: str)
     ("text", "message"),
     [
         ("{", "not JSON"),
-        ('{"format": 99}', "floor plan of another format"),
-        ('{"format": 1, "name": "room_1"}', "not a floor plan"),
-        ("[]", "floor plan of another format"),
+        ('{"format": 99}', "not a floor plan of format"),
+        ('{"format": 1, "name": "room_1"}', "key 'sources' is missing"),
+        ("[]", "not a floor plan of format"),
     ],
 )
 def test_a_broken_file_is_named(tmp_path: Path, text: str, message: str) -> None:

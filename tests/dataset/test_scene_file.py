@@ -37,7 +37,7 @@ def test_any_changed_byte_is_found(path, at):
     content = bytearray(path.read_bytes())
     content[at] ^= 0x10
     path.write_bytes(content)
-    with pytest.raises(UserError, match=r"tail\.h5: .*make it again"):
+    with pytest.raises(UserError, match=r"tail\.h5: .*make it anew"):
         scene_file.open_checked(path, "tail", 3)
 
 

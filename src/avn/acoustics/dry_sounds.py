@@ -128,7 +128,10 @@ def _content(path: str) -> bytes:
     if path in BUILTIN:
         return (resources.files("avn") / "assets" / "dry_sounds" / f"{path}.flac").read_bytes()
     try:
-        content = Path(path).expanduser().read_bytes()
+        file = Path(path).expanduser()
+        if file.exists() and not (file.is_file() or file.is_dir()):
+            raise _error(path, "is no file but a device or pipe", f"give {_choices()}")
+        content = file.read_bytes()
     except FileNotFoundError:
         raise _error(path, "does not exist", f"give {_choices()}") from None
     except IsADirectoryError:

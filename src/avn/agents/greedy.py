@@ -42,8 +42,8 @@ class Greedy(Agent):
     needs = ("sound",)
 
     def __init__(self, slack: float = 0.25, patience: int = 4) -> None:
-        if slack < 0:
-            raise UserError(f"baseline.slack: {slack} is negative; give metres")
+        if not 0 <= slack <= 100:
+            raise UserError(f"baseline.slack: {slack}; give metres, 0 or more")
         if patience < 1:
             raise UserError(f"baseline.patience: {patience} is less than 1, so it could not turn")
         self.slack = slack

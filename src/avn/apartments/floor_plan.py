@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avn.apartments.plan_checks import check, number, part
 from avn.errors import UserError
 
 CELL = 0.5
@@ -142,16 +142,31 @@ def from_dict(data: dict[str, Any], origin: str = "floor plan") -> FloorPlan:
     """
     if not isinstance(data, dict) or data.get("format") != FORMAT_VERSION:
         raise UserError(
-            f"{origin}: floor plan of another format (wanted format {FORMAT_VERSION}); "
-            "make it again with this version"
+            f"{origin}: not a floor plan of format {FORMAT_VERSION}, the one of this version; "
+            "see docs/dataset.md"
         )
-    try:
-        parts = {key: tuple(cls(**part) for part in data[key]) for key, cls in _PARTS.items()}
-        sources = tuple((float(x), float(y)) for x, y in data["sources"])
-        plan = FloorPlan(name=str(data["name"]), sources=sources, **parts)
-        _check(plan, origin)
-    except (KeyError, TypeError, ValueError) as error:
-        raise UserError(f"{origin}: not a floor plan ({error}); see docs/dataset.md") from error
+    known = ("format", "name", "sources", *_PARTS)
+    for key in known:
+        if key not in data:
+            raise UserError(f"{origin}: key '{key}' is missing; see docs/dataset.md")
+    for key in data:
+        if key not in known:
+            raise UserError(f"{origin}: unknown key '{key}'; there are {', '.join(known)}")
+    for key in (*_PARTS, "sources"):
+        if not isinstance(data[key], list | tuple):
+            raise UserError(f"{origin}: '{key}' is no list; see docs/dataset.md")
+    for place in data["sources"]:
+        if not isinstance(place, list | tuple) or [number(v) for v in place] != [True, True]:
+            raise UserError(f"{origin}: a source is {place!r}, not [x, y] in metres")
+    plan = FloorPlan(
+        name=str(data["name"]),
+        sources=tuple((float(x), float(y)) for x, y in data["sources"]),
+        **{
+            key: tuple(part(cls, own, f"{origin}: {key}[{i}]") for i, own in enumerate(data[key]))
+            for key, cls in _PARTS.items()
+        },
+    )
+    check(plan, origin, CELL, CEILING, ROOM_KINDS)
     return plan
 
 
@@ -164,25 +179,3 @@ def load(path: Path) -> FloorPlan:
     except ValueError as error:
         raise UserError(f"{path}: not JSON ({error}); give the path of a floor plan") from error
     return from_dict(data, str(path))
-
-
-def _check(plan: FloorPlan, origin: str) -> None:
-    for room in plan.rooms:
-        if room.kind not in ROOM_KINDS:
-            raise UserError(f"{origin}: room kind '{room.kind}' is none of {', '.join(ROOM_KINDS)}")
-        bounds = (room.x0, room.y0, room.x1, room.y1)
-        if any(not math.isclose(v / CELL, round(v / CELL), abs_tol=1e-6) for v in bounds):
-            raise UserError(f"{origin}: walls of the {room.kind} are not on the {CELL} m lattice")
-    openings: list[Doorway | Window] = [*plan.doorways, *plan.windows]
-    for opening in openings:
-        if opening.along not in ("x", "y"):
-            raise UserError(f"{origin}: 'along' is '{opening.along}', not 'x' or 'y'")
-    for door in plan.doorways:
-        if any(not math.isclose(v / CELL, round(v / CELL), abs_tol=1e-6) for v in (door.x, door.y)):
-            raise UserError(
-                f"{origin}: the doorway at ({door.x}, {door.y}) is not centred on the {CELL} m "
-                "lattice; move it"
-            )
-    for piece in plan.furniture:
-        if piece.heading not in (0, 1, 2, 3):
-            raise UserError(f"{origin}: heading of a {piece.kind} is {piece.heading}, not 0 to 3")

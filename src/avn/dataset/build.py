@@ -20,6 +20,7 @@ import numpy as np
 from avn.acoustics import brir
 from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.first_arrival import FirstArrivals
+from avn.acoustics.materials import NAMES
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid, source_cells
 from avn.apartments.sight import line_of_sight
@@ -27,6 +28,7 @@ from avn.apartments.surfaces import build_surfaces
 from avn.apartments.walls import walls
 from avn.dataset import scene, scene_file
 from avn.dataset.scene import Scene
+from avn.errors import UserError
 from avn.progress import progress_bar
 from avn.stages import digest, written_whole
 
@@ -68,6 +70,7 @@ def build_geometry(plan: FloorPlan, acoustics: AcousticsConfig, folder: Path) ->
         grid = build_grid(plan)
         sources = source_cells(plan, grid)
         surfaces = build_surfaces(plan)
+        _check_materials(plan)
         ears = _points(grid.centres, acoustics.ear_height)
         places = _points(grid.centres[sources], acoustics.source_height)
         pairs = (len(sources), grid.cells, 3)
@@ -88,6 +91,16 @@ def build_geometry(plan: FloorPlan, acoustics: AcousticsConfig, folder: Path) ->
 
         scene_file.write(path, "geometry", scene.GEOMETRY_VERSION, made_from, fill)
     return scene.load(folder, made_from)
+
+
+def _check_materials(plan: FloorPlan) -> None:
+    named = [(room.kind, m) for room in plan.rooms for m in (room.floor, room.walls, room.ceiling)]
+    for kind, material in [*named, *((piece.kind, piece.material) for piece in plan.furniture)]:
+        if material not in NAMES:
+            raise UserError(
+                f"floor plan {plan.name}: material '{material}' of a {kind} is not known; "
+                f"use one of {', '.join(NAMES)}"
+            )
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from avn.stages import written_whole
 _BLOCK = 512
 _CHUNK = 1 << 24
 _HEADER = re.compile(rb"AVN scene file, (\d+) bytes with CRC-32 ([0-9a-f]{8}) follow\n\0*")
-_MEND = "delete it and run `python -m avn.generate` to make it again"
+_MEND = "delete it and run the command again to make it anew"
 
 
 def write(

@@ -61,6 +61,10 @@ class FiveLayerCnn(nn.Module):
         reach: float = 10.0,
     ) -> None:
         super().__init__()
+        if min([*widths, *hidden], default=1) < 1:
+            raise UserError("sound_model.net: widths and hidden are 1 or more each")
+        if not (0 <= dropout < 1 and reach > 0):
+            raise UserError("sound_model.net: dropout is 0 to 1 and reach over 0 metres")
         if pool not in ("stride", "max"):
             raise UserError(f"sound_model.net.pool is '{pool}'; give stride or max")
         if min(height, width) < 2 ** len(widths) and pool == "max":

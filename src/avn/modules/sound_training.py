@@ -88,6 +88,8 @@ def fit(
             deterministic=torch.cuda.is_available(),
         )
         trainer.fit(model, data, ckpt_path=str(last) if last.exists() else None)
+    if trainer.interrupted or not trainer.state.finished:
+        raise KeyboardInterrupt  # Lightning swallows it, and an unfinished network is none
     load_weights(model, folder / BEST)
     best = min(history.epochs, key=lambda epoch: epoch[MONITOR])
     return {"epochs": len(history.epochs), **best}
@@ -122,9 +124,13 @@ def _read_checkpoint(path: Path, model: SoundCnn) -> dict[str, Any]:
         checkpoint = torch.load(path, map_location="cpu", weights_only=True)
         recipe, _ = dict(checkpoint["hyper_parameters"]), checkpoint["state_dict"]
     except FileNotFoundError as error:
-        raise UserError(f"{path}: no such checkpoint; train with avn.train first") from error
+        raise UserError(
+            f"{path}: no such checkpoint; delete {path.parent} to train again"
+        ) from error
     except Exception as error:  # whatever a damaged file makes the reader raise
-        raise UserError(f"{path}: not a checkpoint of the sound network; remove it") from error
+        raise UserError(
+            f"{path}: not a checkpoint of the sound network; delete {path.parent} to train again"
+        ) from error
     wanted = dict(model.hparams)
     for key, value in _flat(wanted).items():
         found = _flat(recipe).get(key, "missing")

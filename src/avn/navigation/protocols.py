@@ -15,6 +15,7 @@ from avn.navigation.actions import STOP
 
 GOALS = ("box", "radius")
 PATHS = ("attempted", "walked")
+MOST = 100_000  # actions, starts and steps that are still a protocol
 
 
 @dataclass
@@ -79,11 +80,11 @@ class Protocol:
             if value not in known:
                 raise UserError(f"protocol.{key}: '{value}' is none of {', '.join(known)}")
         for key, least in (("max_actions", 1), ("starts", 1), ("exploration", 0)):
-            if getattr(self, key) < least:
-                raise UserError(f"protocol.{key}: {getattr(self, key)} is less than {least}")
-        if self.radius < 0:
-            raise UserError(f"protocol.radius: {self.radius} is negative; give metres")
-        if self.moves_factor is not None and self.moves_factor < 1:
+            if not least <= getattr(self, key) <= MOST:
+                raise UserError(f"protocol.{key}: {getattr(self, key)}; give {least} to {MOST}")
+        if not 0 <= self.radius <= MOST:
+            raise UserError(f"protocol.radius: {self.radius}; give metres, 0 or more")
+        if self.moves_factor is not None and not 1 <= self.moves_factor <= MOST:
             raise UserError(
                 f"protocol.moves_factor: {self.moves_factor} is less than 1, so that no walk could "
                 "arrive; give at least 1, or null for no cap"
