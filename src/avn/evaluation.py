@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
+from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
 from avn import pipeline
@@ -16,6 +18,7 @@ from avn.agents.base import Agent
 from avn.dataset import build
 from avn.dataset.scene import Scene
 from avn.errors import UserError
+from avn.modules.hearing import sound_errors
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
 from avn.navigation.protocols import Protocol
 from avn.navigation.run import Labels, walk_room
@@ -23,8 +26,8 @@ from avn.reporting import results, table
 from avn.stages import check_name, digest, make_once, written_whole
 
 # Raised when the code of simulator, agents or metrics changes a record.
-VERSION = 1
-RESULTS, EPISODE_RECORDS = "results.csv", "episodes.csv"
+VERSION = 2
+RESULTS, EPISODE_RECORDS, HEARD = "results.csv", "episodes.csv", "hearing.csv"
 EPISODES = {"frozen": frozen_episodes, "exhaustive": exhaustive_episodes}
 
 
@@ -88,6 +91,7 @@ def _walk(cfg: DictConfig, agent: Agent, protocol: Protocol, folder: Path) -> No
     if pipeline.hears(cfg):
         pipeline.scenes(cfg, ("test",), audible=True)
         hearing = pipeline.hearing(cfg, rooms)
+        _write_heard(cfg, rooms, hearing, folder)
     labels = Labels(agent=cfg.agent.name, acoustics=cfg.acoustics.name)
     walked = [
         walk_room(agent, room, episodes_of(cfg, room, protocol), protocol, labels, heard)
@@ -100,6 +104,17 @@ def _walk(cfg: DictConfig, agent: Agent, protocol: Protocol, folder: Path) -> No
         OmegaConf.save(cfg, part, resolve=True)
     results.write_csv(episodes, folder / EPISODE_RECORDS)
     results.write_csv(summary, folder / RESULTS)
+
+
+def _write_heard(
+    cfg: DictConfig, rooms: Sequence[Scene], hearing: Sequence[Tensor], folder: Path
+) -> None:
+    """How far what is heard in each room lies from the source, by sound and sight."""
+    names = tuple(pipeline.sound_files(cfg))
+    acoustics = pipeline.acoustics_of(cfg)
+    errors = [sound_errors(room, heard, names) for room, heard in zip(rooms, hearing, strict=True)]
+    table = pd.concat(errors, ignore_index=True).assign(acoustics=acoustics.name)
+    results.write_csv(table, folder / HEARD)
 
 
 def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
@@ -128,6 +143,8 @@ def show(cfg: DictConfig, folder: Path) -> None:
     privileged = [cfg.agent.name] if cfg.agent.privileged else []
     runs, episodes = read(folder)
     table.print_tables(runs, episodes, privileged=privileged)
+    if (folder / HEARD).is_file():
+        table.print_heard(pd.read_csv(folder / HEARD))
 
 
 def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:

@@ -56,7 +56,7 @@ def test_takes_and_seeds_differ_and_repeat(model: SoundCnn, heard: torch.Tensor)
 
 def test_errors_are_medians_over_the_right_clips(heard: torch.Tensor) -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    table = sound_errors(scene, "resonance", heard, sounds).set_index(["sound", "sight"])
+    table = sound_errors(scene, heard, sounds.names).set_index(["sound", "sight"])
     truth = scene.brirs("resonance").locations.numpy()[:, :, None, None]
     error = np.linalg.norm(heard.numpy() - truth, axis=-1)
     seen = np.repeat(scene.in_sight, 4, axis=1)
@@ -71,7 +71,7 @@ def test_front_back_confusions_are_counted() -> None:
     truth = scene.brirs("resonance").locations[:, :, None, None].repeat(1, 1, 2, 1, 1)
     confused = truth.clone()
     confused[:, :, 1] *= -1.0
-    table = sound_errors(scene, "resonance", confused, sounds).set_index(["sound", "sight"])
+    table = sound_errors(scene, confused, sounds.names).set_index(["sound", "sight"])
     assert table.loc[("hiss", "all"), "front_back"] == 0.0
     assert table.loc[("hiss", "all"), "error_m"] == 0.0
     # At the source itself there is no bearing.

@@ -43,6 +43,14 @@ def relative_locations(lattice: Tensor, sources: Tensor) -> Tensor:
     return torch.stack((right, front), -1).flatten(1, 2)
 
 
+def where_sources_are(scene: Scene) -> tuple[Tensor, Tensor]:
+    """Relative locations (K, S, 2), and whether each source is in sight (K, S), of an apartment."""
+    lattice = torch.from_numpy(scene.grid.lattice.astype("int64"))
+    sources = torch.from_numpy(scene.sources.astype("int64"))
+    in_sight = torch.from_numpy(scene.in_sight).repeat_interleave(4, dim=1)
+    return relative_locations(lattice, sources), in_sight
+
+
 @dataclass
 class SceneClips:
     """What is needed of one apartment to render clips and to judge what is heard.
@@ -63,10 +71,7 @@ class SceneClips:
     @classmethod
     def of(cls, scene: Scene, regime: str) -> SceneClips:
         """Open an apartment in one regime."""
-        lattice = torch.from_numpy(scene.grid.lattice.astype("int64"))
-        sources = torch.from_numpy(scene.sources.astype("int64"))
-        in_sight = torch.from_numpy(scene.in_sight).repeat_interleave(4, dim=1)
-        return cls(scene.brirs(regime), relative_locations(lattice, sources), in_sight)
+        return cls(scene.brirs(regime), *where_sources_are(scene))
 
 
 class ClipSet(Dataset[ClipBatch]):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 
 import numpy as np
@@ -11,7 +12,7 @@ from torch import Tensor
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
 from avn.datamodules.ahead import made_ahead, threads_for_one_operation
-from avn.datamodules.sound import SceneClips
+from avn.datamodules.sound import where_sources_are
 from avn.dataset.scene import Scene
 from avn.modules.sound_cnn import SoundCnn
 from avn.modules.sound_metrics import location_errors
@@ -87,16 +88,16 @@ def _silent(count: int) -> None:
     """Show no progress."""
 
 
-def sound_errors(scene: Scene, regime: str, heard: Tensor, sounds: DrySounds) -> pd.DataFrame:
+def sound_errors(scene: Scene, heard: Tensor, sounds: Sequence[str]) -> pd.DataFrame:
     """Report how far what is heard lies from where the sources are.
 
     Parameters
     ----------
     scene : Scene
-    regime : str
     heard : (K, S, sounds, takes, 2) float32 tensor
         As `hear` gives it.
-    sounds : DrySounds
+    sounds : sequence of str
+        Their names.
 
     Returns
     -------
@@ -105,12 +106,12 @@ def sound_errors(scene: Scene, regime: str, heard: Tensor, sounds: DrySounds) ->
         room, sound, sight, clips, error_m and bearing_deg (medians), front_back (share of clips
         whose bearing is off by more than 90 degrees).
     """
-    clips = SceneClips.of(scene, regime)
-    metres, degrees = location_errors(heard, clips.locations[:, :, None, None])
-    in_sight = clips.in_sight[:, :, None, None].expand_as(metres)
+    locations, visible = where_sources_are(scene)
+    metres, degrees = location_errors(heard, locations[:, :, None, None])
+    in_sight = visible[:, :, None, None].expand_as(metres)
     sight_masks = {"in_sight": in_sight, "out_of_sight": ~in_sight, "all": in_sight | True}
     rows = []
-    for index, name in enumerate((*sounds.names, "all")):
+    for index, name in enumerate((*sounds, "all")):
         chosen = slice(None) if name == "all" else slice(index, index + 1)
         for sight, mask in sight_masks.items():
             picked = mask[:, :, chosen]
