@@ -12,7 +12,7 @@ from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
-from avn import pipeline
+from avn import listening, pipeline
 from avn.acoustics.dry_sounds import content_hash, load_sounds
 from avn.agents.base import Agent
 from avn.dataset import build
@@ -35,15 +35,15 @@ def run_hash(cfg: DictConfig) -> str:
     """Hash of what a run's records depend on."""
     acoustics = pipeline.acoustics_of(cfg)
     apartments = [build.first_arrival_hash(p, acoustics) for p in pipeline.plans(cfg)["test"]]
-    ears = pipeline.hear_hash(cfg) if pipeline.hears(cfg) else None
+    ears = listening.hear_hash(cfg) if listening.hears(cfg) else None
     rules = (cfg.protocol, cfg.baseline, cfg.agent, cfg.seed, cfg.episodes)
-    sounds = list(content_hash(pipeline.sound_files(cfg)).items())
+    sounds = list(content_hash(listening.sound_files(cfg)).items())
     return digest(apartments, ears, rules, sounds, VERSION)
 
 
 def run_folder_name(cfg: DictConfig) -> str:
     """`<agent>/<sounds>/seed<seed>-<hash8>`: the folder of a run under `outputs/eval`."""
-    sounds = "-".join(pipeline.sound_files(cfg))
+    sounds = "-".join(listening.sound_files(cfg))
     check_name("agent.name", cfg.agent.name)
     return f"{cfg.agent.name}/{sounds}/seed{cfg.seed}-{run_hash(cfg)[:8]}"
 
@@ -74,7 +74,7 @@ def evaluate(cfg: DictConfig) -> Path:
             f"agent.privileged: {cfg.agent.privileged}, but '{type(agent).__name__}' is "
             f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
         )
-    load_sounds(pipeline.sound_files(cfg))  # a bad file is refused before anything is made
+    load_sounds(listening.sound_files(cfg))  # a bad file is refused before anything is made
     folder = Path(cfg.outputs) / "eval" / run_folder_name(cfg)
     make_once(
         folder,
@@ -88,9 +88,9 @@ def evaluate(cfg: DictConfig) -> Path:
 def _walk(cfg: DictConfig, agent: Agent, protocol: Protocol, folder: Path) -> None:
     rooms = pipeline.scenes(cfg, ("test",))["test"]
     hearing: list[Any] = [None] * len(rooms)
-    if pipeline.hears(cfg):
+    if listening.hears(cfg):
         pipeline.scenes(cfg, ("test",), audible=True)
-        hearing = pipeline.hearing(cfg, rooms)
+        hearing = listening.hearing(cfg, rooms)
         _write_heard(cfg, rooms, hearing, folder)
     labels = Labels(agent=cfg.agent.name, acoustics=cfg.acoustics.name)
     walked = [
@@ -110,7 +110,7 @@ def _write_heard(
     cfg: DictConfig, rooms: Sequence[Scene], hearing: Sequence[Tensor], folder: Path
 ) -> None:
     """How far what is heard in each room lies from the source, by sound and sight."""
-    names = tuple(pipeline.sound_files(cfg))
+    names = tuple(listening.sound_files(cfg))
     acoustics = pipeline.acoustics_of(cfg)
     errors = [sound_errors(room, heard, names) for room, heard in zip(rooms, hearing, strict=True)]
     table = pd.concat(errors, ignore_index=True).assign(acoustics=acoustics.name)
@@ -119,7 +119,7 @@ def _write_heard(
 
 def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
     """The episodes of a room as the config asks for them."""
-    return EPISODES[cfg.episodes](room, list(pipeline.sound_files(cfg)), protocol, cfg.seed)
+    return EPISODES[cfg.episodes](room, list(listening.sound_files(cfg)), protocol, cfg.seed)
 
 
 def read(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -151,7 +151,7 @@ def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
     """TensorBoard's scalars by room and sound, and hparams with SR and SPL to compare runs by."""
     settings = {key: cfg[key].name for key in ("agent", "protocol", "acoustics", "split")}
     settings |= {"seed": cfg.seed, "episodes": cfg.episodes}
-    settings["sounds"] = "-".join(pipeline.sound_files(cfg))
+    settings["sounds"] = "-".join(listening.sound_files(cfg))
     figures = results.headline(summary)
     with SummaryWriter(str(folder)) as writer:
         for row in summary.itertuples():

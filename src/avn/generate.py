@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from omegaconf import DictConfig
 
-from avn import pipeline
+from avn import listening, pipeline
 from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra, export_wav
 from avn.acoustics.dry_sounds import load_sounds
 from avn.cli import command
@@ -62,7 +62,7 @@ def _chosen(cfg: DictConfig, every: list[Scene]) -> list[Scene]:
 
 
 def _export(cfg: DictConfig, chosen: list[Scene]) -> None:
-    sounds = DrySounds(load_sounds(pipeline.sound_files(cfg)))
+    sounds = DrySounds(load_sounds(listening.sound_files(cfg)))
     render = ClipRenderer(sounds, pipeline.typed(cfg.microphone), seed=0, purpose="eval")
     for which in chosen:
         pairs = [tuple(pair) for pair in cfg.clips] or _near_and_far(which)

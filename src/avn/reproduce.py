@@ -10,7 +10,7 @@ from hydra import compose
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
-from avn import evaluation, pipeline
+from avn import evaluation, listening, pipeline
 from avn.cli import command
 from avn.errors import UserError
 from avn.reporting import results, table
@@ -48,7 +48,7 @@ def _runs(cfg: DictConfig, row: str) -> list[DictConfig]:
     runs = []
     for seed in cfg.seeds:
         first = compose("eval", overrides=[*shared, f"agent={row}", f"seed={seed}"])
-        networks = cfg.train_seeds if pipeline.hears(first) else cfg.train_seeds[:1]
+        networks = cfg.train_seeds if listening.hears(first) else cfg.train_seeds[:1]
         for train_seed in networks:
             own = [f"agent={row}", f"seed={seed}", f"sound_model.train_seed={train_seed}"]
             runs.append(compose("eval", overrides=[*shared, *own]))

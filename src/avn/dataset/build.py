@@ -164,10 +164,11 @@ def build_acoustics(scenes: Sequence[Scene], acoustics: AcousticsConfig, process
     jobs = {which.name: _jobs(which, acoustics) for which in missing}
     todo = [job for name in jobs for job in jobs[name] if not job.part.is_file()]
     total = sum(len(job.cells) for which in jobs.values() for job in which)
-    with progress_bar("tracing sound", total, "pairs") as advance:
-        advance(total - sum(len(job.cells) for job in todo))
-        for done in _in_processes(todo, processes):
-            advance(done)
+    if total:
+        with progress_bar("tracing sound", total, "pairs") as advance:
+            advance(total - sum(len(job.cells) for job in todo))
+            for done in _in_processes(todo, processes):
+                advance(done)
     for which in missing:
         _assemble_tail(which, acoustics, jobs[which.name])
     for which in scenes:

@@ -5,7 +5,7 @@ from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from hydra.utils import instantiate
 
-from avn import cli, config, evaluation, pipeline
+from avn import cli, config, evaluation, listening, pipeline
 from avn.dataset import build
 
 NONE, RUN, HEARD, TRAINED = (), ("run",), ("run", "heard"), ("run", "heard", "trained")
@@ -25,8 +25,8 @@ def composed():
 def hashes(cfg):
     return {
         "run": evaluation.run_hash(cfg),
-        "heard": pipeline.hear_hash(cfg),
-        "trained": pipeline.model_hash(cfg),
+        "heard": listening.hear_hash(cfg),
+        "trained": listening.model_hash(cfg),
         "scenes": pipeline.scenes_folder(cfg).name,
     }
 
@@ -67,8 +67,8 @@ def test_a_setting_enters_the_hashes_of_what_it_changes(composed, override, want
 @pytest.mark.parametrize(
     ("versions", "name", "wanted"),
     [
-        (pipeline.VERSIONS, "hear", HEARD),
-        (pipeline.VERSIONS, "sound_cnn", TRAINED),
+        (listening.VERSIONS, "hear", HEARD),
+        (listening.VERSIONS, "sound_cnn", TRAINED),
         (build.MAKING, "geometry", EVERY),
         (build.MAKING, "tail", EVERY),
         (build.MAKING, "first_arrival", EVERY),
@@ -85,7 +85,7 @@ def test_a_raised_version_makes_anew_what_depends_on_it(
 def test_sounds_are_told_apart_by_their_order(composed):
     one = composed("sound=[ring,alarm]")
     other = composed("sound=[alarm,ring]")
-    assert pipeline.hear_hash(one) != pipeline.hear_hash(other)
+    assert listening.hear_hash(one) != listening.hear_hash(other)
 
 
 @pytest.mark.parametrize(
@@ -95,4 +95,4 @@ def test_only_rows_that_say_so_are_shown_the_truth(composed, row):
     cfg = composed(f"agent={row}")
     agent = instantiate(cfg.baseline)
     assert agent.privileged == cfg.agent.privileged == (row == "oracle")
-    assert "sound" not in agent.needs or pipeline.hears(cfg)
+    assert "sound" not in agent.needs or listening.hears(cfg)
