@@ -12,6 +12,7 @@ import soundfile
 import torch
 
 from avn.apartments.splits import FROZEN
+from avn.reporting.results import read_csv
 
 SMALL = (
     "split=mini",
@@ -27,7 +28,9 @@ def run_greedy(command, outputs, *more):
     return command("eval", "agent=greedy", *SMALL, f"outputs={outputs}", *more)
 
 
-def copy(outputs, tmp_path):
+def copy(command, outputs, tmp_path):
+    """A copy, for spoiling, of what a run of greedy made."""
+    run_greedy(command, outputs, "sound=alarm")
     return Path(shutil.copytree(outputs, tmp_path / "copy"))
 
 
@@ -47,10 +50,10 @@ def test_greedy_walks_on_sound_that_was_made_on_the_way(command, outputs):
 def test_a_finished_run_is_reused_and_gives_the_same_bytes_when_made_again(
     command, outputs, tmp_path
 ):
+    again = copy(command, outputs, tmp_path)
     _, out, _ = run_greedy(command, outputs, "sound=alarm")
     assert not any("missing" in line for line in out)
     first = (Path(out[-1]) / "episodes.csv").read_bytes()
-    again = copy(outputs, tmp_path)
     shutil.rmtree(again / "eval")
     shutil.rmtree(again / "hear")
     _, out, _ = run_greedy(command, again, "sound=alarm")
@@ -176,7 +179,7 @@ def _other_version(path):
 def test_a_spoilt_scene_file_is_one_line_and_is_left_as_it_is(
     command, outputs, tmp_path, name, spoil, said
 ):
-    mine = copy(outputs, tmp_path)
+    mine = copy(command, outputs, tmp_path)
     shutil.rmtree(mine / "eval")
     shutil.rmtree(mine / "hear")
     (tail,) = mine.glob("generate/mini-*/room_1/acoustics-tail.h5")
@@ -194,7 +197,7 @@ def test_a_spoilt_scene_file_is_one_line_and_is_left_as_it_is(
 
 
 def test_a_checkpoint_of_another_config_is_one_line(command, outputs, tmp_path):
-    mine = copy(outputs, tmp_path)
+    mine = copy(command, outputs, tmp_path)
     (folder,) = (p for p in (mine / "train").iterdir() if p.is_dir())
     checkpoint = torch.load(folder / "best.ckpt", weights_only=True)
     checkpoint["hyper_parameters"]["batch"] = 7
@@ -260,20 +263,23 @@ def test_reproduce_runs_the_rows_that_are_named(command, outputs):
 
 
 def test_sounds_may_be_a_list_with_paths(command, outputs, tmp_path):
-    soundfile.write(tmp_path / "tone.wav", np.sin(np.arange(16000)), 16000)
-    sounds = f"sound=[ring,{tmp_path / 'tone.wav'}]"
+    # names that a reader of tables could take for a number or for nothing
+    for name in ("440", "nan"):
+        soundfile.write(tmp_path / f"{name}.wav", np.sin(np.arange(16000)), 16000)
+    sounds = f"sound=[ring,{tmp_path / '440.wav'},{tmp_path / 'nan.wav'}]"
     code, out, err = command(
         "eval", "agent=random_walk", "split=mini", f"outputs={outputs}", sounds
     )
     assert code == 0, err
-    assert set(pd.read_csv(Path(out[-1]) / "results.csv")["sound"]) == {"ring", "tone", "all"}
+    sounds = set(read_csv(Path(out[-1]) / "results.csv")["sound"])
+    assert sounds == {"ring", "440", "nan", "all"}
 
 
 @pytest.mark.parametrize("name", ["episodes.csv", "results.csv"])
 @pytest.mark.parametrize("spoil", [_cut, lambda path: path.write_text("")], ids=["cut", "empty"])
 def test_a_damaged_run_is_one_line(command, outputs, tmp_path, name, spoil):
     _, out, _ = run_greedy(command, outputs, "sound=alarm")
-    mine = copy(outputs, tmp_path)
+    mine = copy(command, outputs, tmp_path)
     folder = mine / Path(out[-1]).relative_to(outputs)
     spoil(folder / name)
     code, _, err = run_greedy(command, mine, "sound=alarm")
@@ -283,7 +289,7 @@ def test_a_damaged_run_is_one_line(command, outputs, tmp_path, name, spoil):
 
 
 def test_a_bit_of_a_checkpoint_that_flipped_is_one_line(command, outputs, tmp_path):
-    mine = copy(outputs, tmp_path)
+    mine = copy(command, outputs, tmp_path)
     shutil.rmtree(mine / "hear")
     shutil.rmtree(mine / "eval")
     (path,) = mine.glob("train/*/best.ckpt")

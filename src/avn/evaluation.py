@@ -131,7 +131,8 @@ def read(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
         Where a file is missing, cannot be read, or the results are not those of the episodes.
     """
     try:
-        runs, episodes = pd.read_csv(folder / RESULTS), pd.read_csv(folder / EPISODE_RECORDS)
+        runs = results.read_csv(folder / RESULTS)
+        episodes = results.read_csv(folder / EPISODE_RECORDS)
         pd.testing.assert_frame_equal(runs, results.summarise(episodes))
     except (OSError, ValueError, KeyError, AssertionError, UserError) as error:
         raise UserError(f"{folder}: the run is damaged; delete the folder and run again") from error
@@ -144,7 +145,7 @@ def show(cfg: DictConfig, folder: Path) -> None:
     runs, episodes = read(folder)
     table.print_tables(runs, episodes, privileged=privileged)
     if (folder / HEARD).is_file():
-        table.print_heard(pd.read_csv(folder / HEARD))
+        table.print_heard(results.read_csv(folder / HEARD))
 
 
 def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:

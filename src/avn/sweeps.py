@@ -19,7 +19,7 @@ import pandas as pd
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
-from avn.reporting.results import AVERAGE, across_seeds, write_csv
+from avn.reporting.results import AVERAGE, across_seeds, read_csv, write_csv
 from avn.stages import digest, stage_folder, tell
 
 _RECORDS = "AVN_SWEEP_RECORDS"
@@ -87,7 +87,7 @@ def _spread(records: list[dict[str, Any]]) -> pd.DataFrame:
     for record in records:
         path = Path(record["folder"] or "") / "results.csv"
         if record["folder"] and path.is_file():
-            tables.setdefault(record["setting"], []).append(pd.read_csv(path))
+            tables.setdefault(record["setting"], []).append(read_csv(path))
     spreads = [across_seeds(pd.concat(runs)).assign(setting=key) for key, runs in tables.items()]
     return pd.concat(spreads, ignore_index=True) if spreads else pd.DataFrame()
 

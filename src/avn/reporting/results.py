@@ -162,3 +162,9 @@ def write_csv(table: pd.DataFrame, path: Path) -> None:
     """Write a table whole or not at all."""
     with written_whole(path) as part:
         table.to_csv(part, index=False, lineterminator="\n")
+
+
+def read_csv(path: Path) -> pd.DataFrame:
+    """Read a table of this module back; names stay text, also a sound called 440 or nan."""
+    names = dict.fromkeys((*LABELS, "sound", "room", "outcome"), str)
+    return pd.read_csv(path, dtype=names, keep_default_na=False, na_values=[""])
