@@ -49,6 +49,7 @@ def moved(before, after):
         ("sound=alarm", HEARD),
         ("takes=2", HEARD),
         ("sound_model.epochs=3", TRAINED),
+        ("train_seed=3", TRAINED),
         ("sound_model.train_seed=3", TRAINED),
         ("sound_model.spectrogram.bands=32", TRAINED),
         ("microphone.noise_rms=0.1", TRAINED),

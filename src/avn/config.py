@@ -7,9 +7,10 @@ key or a wrong type is refused with its name.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from hydra.core.config_store import ConfigStore
-from omegaconf import MISSING
+from omegaconf import II, MISSING
 
 from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.clips import MicrophoneConfig
@@ -47,6 +48,7 @@ class CoreConfig:
     protocol: ProtocolConfig = MISSING
     baseline: BaselineConfig = MISSING
     takes: int = MISSING
+    train_seed: int = MISSING
     outputs: str = MISSING
     processes: int = MISSING
     auto: bool = MISSING
@@ -92,12 +94,14 @@ COMMANDS = {
     "eval": EvalConfig,
     "reproduce": ReproduceConfig,
 }
+# Every recipe is trained with the one `train_seed`, unless it is given its own.
+_SEED: Any = II("train_seed")
 # The schema of each group that has one; `greedy_schema` is of an option with its own settings.
 SCHEMAS = {
     ("split", "schema"): SplitConfig,
     ("acoustics", "schema"): AcousticsConfig,
     ("microphone", "schema"): MicrophoneConfig,
-    ("sound_model", "schema"): SoundModelConfig,
+    ("sound_model", "schema"): SoundModelConfig(train_seed=_SEED),
     ("protocol", "schema"): ProtocolConfig,
     ("baseline", "schema"): BaselineConfig,
     ("baseline", "greedy_schema"): GreedyConfig,

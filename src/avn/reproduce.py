@@ -50,7 +50,7 @@ def _runs(cfg: DictConfig, row: str) -> list[DictConfig]:
         first = compose("eval", overrides=[*shared, f"agent={row}", f"seed={seed}"])
         networks = cfg.train_seeds if listening.hears(first) else cfg.train_seeds[:1]
         for train_seed in networks:
-            own = [f"agent={row}", f"seed={seed}", f"sound_model.train_seed={train_seed}"]
+            own = [f"agent={row}", f"seed={seed}", f"train_seed={train_seed}"]
             runs.append(compose("eval", overrides=[*shared, *own]))
     return runs
 
