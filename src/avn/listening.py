@@ -21,7 +21,7 @@ from avn.datamodules.sound import SoundData
 from avn.dataset import build, scene_file
 from avn.dataset.scene import Scene
 from avn.errors import UserError
-from avn.modules import sound_training
+from avn.modules import training
 from avn.modules.hearing import hear
 from avn.modules.sound_cnn import SoundCnn
 from avn.reporting.results import ALL_SOUNDS
@@ -95,8 +95,8 @@ def sound_model(cfg: DictConfig, asked: bool = False) -> tuple[SoundCnn, Path]:
         auto=cfg.auto or asked,
         estimate="a few minutes",
     )
-    best = folder / sound_training.BEST
-    sound_training.load_weights(model, best)
+    best = folder / training.BEST
+    training.load_weights(model, best)
     if read_metrics(folder).get(CHECKSUM) != file_hash(best):
         raise UserError(f"{best}: changed since it was trained; delete {folder} to train again")
     return model, folder
@@ -120,8 +120,8 @@ def _fit(cfg: DictConfig, model: SoundCnn, folder: Path) -> None:
         pipeline.typed(cfg.microphone),
         pipeline.typed(cfg.sound_model),
     )
-    metrics = sound_training.fit(data, model, folder)
-    metrics[CHECKSUM] = file_hash(folder / sound_training.BEST)
+    metrics = training.fit(data, model, folder)
+    metrics[CHECKSUM] = file_hash(folder / training.BEST)
     with written_whole(folder / METRICS) as part:
         part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
 

@@ -9,8 +9,8 @@ from omegaconf import DictConfig, OmegaConf
 
 from avn.errors import UserError
 from avn.modules.five_layer_cnn import FiveLayerCnn
+from avn.modules.listener import PictureBatch
 from avn.modules.sound_cnn import (
-    PictureBatch,
     SoundCnn,
     SoundModelConfig,
     no_sound_model,

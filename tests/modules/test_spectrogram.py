@@ -72,5 +72,5 @@ def test_every_band_hears_something(scale: str) -> None:
     ("key", "value"), [("scale", "bark"), ("window", 1), ("frames", 60), ("bands", 300)]
 )
 def test_bad_option_is_named(key: str, value: object) -> None:
-    with pytest.raises(UserError, match=f"sound_model.spectrogram.{key} is '?{value}"):
+    with pytest.raises(UserError, match=f"spectrogram.{key} is '?{value}"):
         Spectrogram(**{key: value})

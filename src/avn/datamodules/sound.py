@@ -15,7 +15,9 @@ from avn.apartments.floor_plan import CELL
 from avn.datamodules.ahead import AheadLoader
 from avn.dataset.scene import Brirs, Scene
 from avn.errors import UserError
-from avn.modules.sound_cnn import ClipBatch, PictureBatch, SoundModelConfig, build_part
+from avn.modules.listener import ClipBatch, PictureBatch
+from avn.modules.network import build_part
+from avn.modules.sound_cnn import SoundModelConfig
 from avn.modules.spectrogram import Spectrogram
 
 # The clips on which networks in training are compared; the same for every `train_seed`.
@@ -266,7 +268,7 @@ class SoundData(L.LightningDataModule):
             raise UserError("sound_model.batch and sound_model.validation_clips must be 1 or more")
         self.scenes = {"validation": list(validation), "training": list(train)}
         self.sounds, self.recipe = sounds, recipe
-        self.spectrogram: Spectrogram = build_part(recipe.spectrogram)
+        self.spectrogram: Spectrogram = build_part(recipe.spectrogram, "sound_model")
         # Threads that render; the network learns in others.
         self.threads = 1
         seed = recipe.train_seed

@@ -1,4 +1,4 @@
-"""The network behind the sound network: five convolutions, dense layers, a location."""
+"""The network behind what listens: five convolutions, dense layers, a few numbers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class NetConfig:
 
 
 class FiveLayerCnn(nn.Module):
-    """Convolutions of 3 x 3 that each halve the picture, then dense layers to a location.
+    """Convolutions of 3 x 3 that each halve the picture, then dense layers to a few numbers.
 
     Each layer is convolution, ReLU, halving and batch normalisation. Sizes 64-128-256-512-512
     with max-pooling, dense layers 4096-1000 and tanh are those of the code released with Gan et
@@ -45,7 +45,8 @@ class FiveLayerCnn(nn.Module):
     dropout : float
         Share of inputs of each dense layer that training silences.
     reach : float
-        Metres for an output of 1.
+        Factor on the outputs; for locations, metres.
+    outputs : int
     """
 
     def __init__(
@@ -59,17 +60,18 @@ class FiveLayerCnn(nn.Module):
         tanh: bool = False,
         dropout: float = 0.25,
         reach: float = 10.0,
+        outputs: int = 2,
     ) -> None:
         super().__init__()
         if min([*widths, *hidden], default=1) < 1:
-            raise UserError("sound_model.net: widths and hidden are 1 or more each")
+            raise UserError("net: widths and hidden are 1 or more each")
         if not (0 <= dropout < 1 and reach > 0):
-            raise UserError("sound_model.net: dropout is 0 to 1 and reach over 0 metres")
+            raise UserError("net: dropout is 0 to 1 and reach over 0 metres")
         if pool not in ("stride", "max"):
-            raise UserError(f"sound_model.net.pool is '{pool}'; give stride or max")
+            raise UserError(f"net.pool is '{pool}'; give stride or max")
         if min(height, width) < 2 ** len(widths) and pool == "max":
             raise UserError(
-                f"sound_model.spectrogram: {height} x {width} is too small for {len(widths)} "
+                f"spectrogram: {height} x {width} is too small for {len(widths)} "
                 "halvings; raise bands and frames"
             )
         self.reach = reach
@@ -86,10 +88,10 @@ class FiveLayerCnn(nn.Module):
         for wide in hidden:
             layers += [nn.Dropout(dropout), nn.Linear(size, wide), nn.ReLU()]
             size = wide
-        layers += [nn.Dropout(dropout), nn.Linear(size, 2)]
+        layers += [nn.Dropout(dropout), nn.Linear(size, outputs)]
         layers += [nn.Tanh()] if tanh else []
         self.layers = nn.Sequential(*layers)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """(N, channels, height, width) pictures to (N, 2) metres right and front."""
+        """(N, channels, height, width) pictures to (N, outputs)."""
         return self.layers(pictures) * self.reach

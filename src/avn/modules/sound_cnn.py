@@ -2,59 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypedDict
+from typing import Any
 
-import lightning as L
-import torch
-from hydra.errors import InstantiationException
-from hydra.utils import instantiate
-from lightning.pytorch.utilities.types import OptimizerLRSchedulerConfig
+from lightning.pytorch.callbacks import Callback
 from omegaconf import MISSING
 from torch import Tensor, nn
-from torch.optim.lr_scheduler import LambdaLR
 from torchmetrics import MeanSquaredError
 
-from avn.errors import UserError
 from avn.modules.five_layer_cnn import NetConfig
+from avn.modules.listener import Listener, PictureBatch
+from avn.modules.network import SPLITS, OptimizerConfig
 from avn.modules.sound_metrics import LocationErrors
-from avn.modules.spectrogram import Spectrogram, SpectrogramConfig
-
-# The two sets of apartments on which a network in training is measured, in this order.
-SPLITS = ("validation", "training")
-
-
-class ClipBatch(TypedDict):
-    """N clips and what is to be known about them.
-
-    clips (N, 2, rate) float32; target (N, 2) float32, metres right and front; in_sight (N,)
-    bool; sound (N,) int64.
-    """
-
-    clips: Tensor
-    target: Tensor
-    in_sight: Tensor
-    sound: Tensor
-
-
-class PictureBatch(TypedDict):
-    """The same of N clips as pictures (N, channels, bands, frames) float32."""
-
-    pictures: Tensor
-    target: Tensor
-    in_sight: Tensor
-    sound: Tensor
-
-
-@dataclass
-class OptimizerConfig:
-    """The optimiser and its rate; any class of torch.optim that takes these two."""
-
-    _target_: str = "torch.optim.AdamW"
-    lr: float = 2e-3
-    weight_decay: float = 1e-2
+from avn.modules.spectrogram import SpectrogramConfig
+from avn.reporting.sound_figures import SoundFigures
 
 
 @dataclass
@@ -84,17 +46,7 @@ def no_sound_model(**_: Any) -> None:
     """What the option `none` of the group builds: nothing, so that no agent hears."""
 
 
-def build_part(config: Any, **given: Any) -> Any:
-    """Build an object from its config; a mistake of the user's stays one."""
-    try:
-        return instantiate(config, **given)
-    except InstantiationException as error:
-        if isinstance(error.__cause__, UserError):
-            raise error.__cause__ from None
-        raise
-
-
-class SoundCnn(L.LightningModule):
+class SoundCnn(Listener):
     """Spectrogram, network and the recipe that trains them.
 
     Parameters
@@ -118,6 +70,13 @@ class SoundCnn(L.LightningModule):
         Read by the data module; kept here so that the checkpoint knows its whole recipe.
     """
 
+    node = "sound_model"
+    what = "sound network"
+    # Median over all validation clips.
+    monitor = "error_m/validation/all/all"
+    # A source on the right is on the left once the ears are exchanged.
+    mirror_signs = (-1.0, 1.0)
+
     def __init__(
         self,
         name: str,
@@ -136,23 +95,11 @@ class SoundCnn(L.LightningModule):
     ) -> None:
         super().__init__()
         self.save_hyperparameters()
-        if schedule not in ("cosine", "constant"):
-            raise UserError(f"sound_model.schedule is '{schedule}'; give cosine or constant")
-        for key, value in (("epochs", epochs), ("batch", batch), ("patience", patience)):
-            if value < 1:
-                raise UserError(f"sound_model.{key} is {value}; give at least 1")
-        self.mirror, self.symmetric, self.train_seed = mirror, symmetric, train_seed
-        self.spectrogram: Spectrogram = build_part(spectrogram)
-        shape = (self.spectrogram.channels, self.spectrogram.bands, self.spectrogram.frames)
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(train_seed)
-            built = build_part(net, channels=shape[0], height=shape[1], width=shape[2])
-        self.net: nn.Module = built.to(memory_format=torch.channels_last)
+        self.build_ears()
         self.training_loss = MeanSquaredError()
         # Plain lists: they take what is already on the CPU and are no part of a checkpoint.
         self.losses = [MeanSquaredError() for _ in SPLITS]
         self.errors: list[LocationErrors] = []
-        self.measured: dict[str, float] = {}
 
     def forward(self, clips: Tensor) -> Tensor:
         """Hear N clips.
@@ -166,18 +113,11 @@ class SoundCnn(L.LightningModule):
         (N, 2) float32 tensor
             Metres to the right and to the front.
         """
-        return self.estimate(self.spectrogram(clips))
+        return super().forward(clips)
 
-    def estimate(self, pictures: Tensor) -> Tensor:
-        """(N, channels, bands, frames) pictures to (N, 2) metres; see `forward`."""
-        if not self.symmetric or self.training:
-            return self._net(pictures)
-        both = torch.cat((pictures, self.spectrogram.mirror(pictures)))
-        straight, mirrored = self._net(both).chunk(2)
-        return (straight + mirrored * mirrored.new_tensor((-1.0, 1.0))) / 2
-
-    def _net(self, pictures: Tensor) -> Tensor:
-        return self.net(pictures.contiguous(memory_format=torch.channels_last))
+    def figures(self) -> list[Callback]:
+        """Locations on a floor plan, spectrograms and audio."""
+        return [SoundFigures()]
 
     def name_sounds(self, sounds: Sequence[str]) -> None:
         """Say what the sounds of the batches are called; the metrics are by these names."""
@@ -185,20 +125,11 @@ class SoundCnn(L.LightningModule):
 
     def training_step(self, batch: PictureBatch, index: int) -> Tensor:
         """The mean square error in square metres, with half of the clips mirrored."""
-        pictures, target = batch["pictures"], batch["target"]
-        if self.mirror:
-            chosen = torch.rand(len(target)).lt(0.5).to(target.device)
-            mirrored = self.spectrogram.mirror(pictures)
-            pictures = torch.where(chosen[:, None, None, None], mirrored, pictures)
-            target = torch.where(chosen[:, None], target * target.new_tensor((-1.0, 1.0)), target)
+        pictures, target = self.half_mirrored(batch["pictures"], batch["target"])
         estimate = self._net(pictures)
         loss = nn.functional.mse_loss(estimate, target)
         self.training_loss(estimate.detach().flatten(), target.flatten())
         return loss
-
-    def on_train_epoch_start(self) -> None:
-        """Draw dropout and mirroring from the epoch, so that a resumed run goes on exactly."""
-        torch.manual_seed(self.train_seed * 1_000_003 + self.current_epoch)
 
     def on_train_epoch_end(self) -> None:
         """Log the loss that the epoch's steps saw (with dropout, on fresh clips)."""
@@ -221,29 +152,4 @@ class SoundCnn(L.LightningModule):
                 values[f"{kind}/{split}/{group}"] = value
             loss.reset()
             errors.reset()
-            self.log_dict(values)
-            self.measured |= {name: float(value) for name, value in values.items()}
-
-    def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
-        """The optimiser of the recipe; the rate follows `schedule` step by step."""
-        optimizer = build_part(self.hparams["optimizer"], params=list(self.net.parameters()))
-        steps = int(self.trainer.estimated_stepping_batches)
-        return {
-            "optimizer": optimizer,
-            "lr_scheduler": {
-                "scheduler": LambdaLR(optimizer, self._rate(steps)),
-                "interval": "step",
-            },
-        }
-
-    def _rate(self, steps: int) -> Any:
-        if self.hparams["schedule"] == "constant":
-            return lambda step: 1.0
-        warm = max(1, steps // 10)
-
-        def factor(step: int) -> float:
-            if step < warm:
-                return (step + 1) / warm
-            return 0.5 * (1 + math.cos(math.pi * min(1.0, (step - warm) / max(1, steps - warm))))
-
-        return factor
+            self.keep(values)

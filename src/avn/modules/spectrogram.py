@@ -50,7 +50,7 @@ class Spectrogram(nn.Module):
     Raises
     ------
     UserError
-        Where a parameter cannot work, by its name in the config.
+        Where a parameter cannot work, by its name in the config node.
     """
 
     band_weights: Tensor
@@ -170,7 +170,7 @@ def band_weights(rate: int, window: int, bands: int, scale: str) -> Tensor:
 
 
 def _check(rate: int, window: int, bands: int, frames: int, scale: str) -> None:
-    where = "sound_model.spectrogram"
+    where = "spectrogram"
     if scale not in ("mel", "linear"):
         raise UserError(f"{where}.scale is '{scale}'; give mel or linear")
     if not 2 <= window <= rate:

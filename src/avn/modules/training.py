@@ -1,4 +1,4 @@
-"""Fits a sound network in a folder: checkpoints, TensorBoard, resuming."""
+"""Fits a network in a folder: checkpoints, TensorBoard, resuming."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import lightning as L
 import torch
@@ -15,30 +15,28 @@ from lightning.pytorch.callbacks import Callback, EarlyStopping, ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
 
 from avn.datamodules.ahead import threads_for_one_operation
-from avn.datamodules.sound import SoundData
 from avn.errors import UserError
-from avn.modules.sound_cnn import SPLITS, SoundCnn
+from avn.modules.network import Network
 from avn.progress import progress_bar
-from avn.reporting.sound_figures import SoundFigures
 
 BEST, LAST = "best.ckpt", "last.ckpt"
-# Median over all validation clips: what a checkpoint is chosen by.
-MONITOR = "error_m/validation/all/all"
+Trained = TypeVar("Trained", bound=Network)
 
 
 def fit(
-    data: SoundData, model: SoundCnn, folder: Path, accelerator: str = "auto"
+    data: L.LightningDataModule, model: Network, folder: Path, accelerator: str = "auto"
 ) -> dict[str, Any]:
-    """Train a sound network in a folder, or go on where a stopped training was.
+    """Train a network in a folder, or go on where a stopped training was.
 
-    Writes TensorBoard's events, `best.ckpt` (lowest median error on the validation apartments)
-    and `last.ckpt` into the folder. Sets the model's weights to the best ones. With the same
+    Writes TensorBoard's events, `best.ckpt` (the epoch that the model's `monitor` says) and
+    `last.ckpt` into the folder. Sets the model's weights to the best ones. With the same
     recipe and the same machine the weights are the same, whether it was interrupted or not.
 
     Parameters
     ----------
-    data : SoundData
-    model : SoundCnn
+    data : LightningDataModule
+        With `threads`, how many threads make its batches, and loaders with samplers.
+    model : Network
         Built from the same recipe as `data`.
     folder : Path
     accelerator : str
@@ -47,8 +45,7 @@ def fit(
     Returns
     -------
     dict
-        `epochs` trained, the best `epoch`, and what was measured there: losses, medians in
-        metres and degrees by split, sight and sound, such as `error_m/validation/in_sight/ring`.
+        `epochs` trained, the best `epoch`, and what the model measured there.
 
     Raises
     ------
@@ -59,20 +56,26 @@ def fit(
     last = folder / LAST
     if last.exists():
         _read_checkpoint(last, model)
-    model.name_sounds(data.sounds.names)
+    model.prepare(data)
     history = _History()
     # Patience and the best checkpoint come before the last one, which so holds their state.
     callbacks = [
-        EarlyStopping(MONITOR, patience=model.hparams["patience"], check_on_train_epoch_end=True),
+        EarlyStopping(
+            model.monitor,
+            mode=model.mode,
+            patience=model.hparams["patience"],
+            check_on_train_epoch_end=True,
+        ),
         history,
-        SoundFigures(),
+        *model.figures(),
         _Progress(),
-        _every_epoch(folder, BEST, MONITOR),
+        _every_epoch(folder, BEST, model.monitor, model.mode),
         _every_epoch(folder, LAST, None),
     ]
     cores = torch.get_num_threads()
-    data.threads = max(1, cores // 2)
-    learning = threads_for_one_operation(max(1, cores - data.threads))
+    making = max(1, cores // 2)
+    data.threads = making  # type: ignore[attr-defined]
+    learning = threads_for_one_operation(max(1, cores - making))
     with _quiet(), learning, torch.random.fork_rng(devices=[]):
         trainer = L.Trainer(
             default_root_dir=folder,
@@ -91,22 +94,26 @@ def fit(
     if trainer.interrupted or not trainer.state.finished:
         raise KeyboardInterrupt  # Lightning swallows it, and an unfinished network is none
     load_weights(model, folder / BEST)
-    best = min(history.epochs, key=lambda epoch: epoch[MONITOR])
+    sign = 1 if model.mode == "min" else -1
+    best = min(history.epochs, key=lambda epoch: sign * epoch[model.monitor])
     return {"epochs": len(history.epochs), **best}
 
 
-def _every_epoch(folder: Path, name: str, monitor: str | None) -> ModelCheckpoint:
-    """Keep one checkpoint: of the epoch where `monitor` is lowest, or of the latest."""
+def _every_epoch(
+    folder: Path, name: str, monitor: str | None, mode: str = "min"
+) -> ModelCheckpoint:
+    """Keep one checkpoint: of the epoch where `monitor` is best, or of the latest."""
     return ModelCheckpoint(
         dirpath=folder,
         filename=Path(name).stem,
         monitor=monitor,
+        mode=mode,
         save_on_train_epoch_end=True,
         enable_version_counter=False,
     )
 
 
-def load_weights(model: SoundCnn, path: Path) -> SoundCnn:
+def load_weights(model: Trained, path: Path) -> Trained:
     """Give a network the weights of a checkpoint of the same recipe, and stop its training.
 
     Raises
@@ -118,7 +125,7 @@ def load_weights(model: SoundCnn, path: Path) -> SoundCnn:
     return model.eval()
 
 
-def _read_checkpoint(path: Path, model: SoundCnn) -> dict[str, Any]:
+def _read_checkpoint(path: Path, model: Network) -> dict[str, Any]:
     """Read a checkpoint and compare its recipe with the model's."""
     try:
         checkpoint = torch.load(path, map_location="cpu", weights_only=True)
@@ -129,14 +136,14 @@ def _read_checkpoint(path: Path, model: SoundCnn) -> dict[str, Any]:
         ) from error
     except Exception as error:  # whatever a damaged file makes the reader raise
         raise UserError(
-            f"{path}: not a checkpoint of the sound network; delete {path.parent} to train again"
+            f"{path}: not a checkpoint of the {model.what}; delete {path.parent} to train again"
         ) from error
     wanted = dict(model.hparams)
     for key, value in _flat(wanted).items():
         found = _flat(recipe).get(key, "missing")
         if found != value:
             raise UserError(
-                f"{path}: checkpoint of another config (sound_model.{key} is {found} there, "
+                f"{path}: checkpoint of another config ({model.node}.{key} is {found} there, "
                 f"{value} here); give the same value or train again"
             )
     return checkpoint
@@ -157,7 +164,7 @@ class _History(Callback):
         self.epochs: list[dict[str, float]] = []
 
     def on_train_epoch_end(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
-        assert isinstance(pl_module, SoundCnn)
+        assert isinstance(pl_module, Network)
         self.epochs.append({"epoch": trainer.current_epoch, **pl_module.measured})
 
     def state_dict(self) -> dict[str, Any]:
@@ -168,7 +175,7 @@ class _History(Callback):
 
 
 class _Progress(Callback):
-    """One bar for the whole training: clips heard, clips a second, time left."""
+    """One bar for the whole training: inputs seen, inputs a second, time left."""
 
     def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         data = trainer.datamodule  # type: ignore[attr-defined]
@@ -176,7 +183,10 @@ class _Progress(Callback):
         measured = sum(len(loader.sampler) for loader in data.val_dataloader())
         left = (trainer.max_epochs or 0) - trainer.current_epoch
         self._stack = ExitStack()
-        bar = progress_bar("training the sound network", left * (epoch + measured), "clips")
+        assert isinstance(pl_module, Network)
+        bar = progress_bar(
+            f"training the {pl_module.what}", left * (epoch + measured), pl_module.unit
+        )
         self._advance = self._stack.enter_context(bar)
 
     def on_train_batch_end(self, *args: Any, **kwargs: Any) -> None:
@@ -212,6 +222,3 @@ def _quiet() -> Iterator[None]:
             yield
     finally:
         logger.setLevel(level)
-
-
-__all__ = ["BEST", "LAST", "SPLITS", "fit", "load_weights"]

@@ -13,7 +13,7 @@ from avn.acoustics.clips import MicrophoneConfig
 from avn.datamodules.sound import SoundData
 from avn.errors import UserError
 from avn.modules.sound_cnn import SoundCnn, SoundModelConfig
-from avn.modules.sound_training import BEST, LAST, fit, load_weights
+from avn.modules.training import BEST, LAST, fit, load_weights
 
 
 def recipe(**changes: Any) -> SoundModelConfig:
