@@ -1,0 +1,73 @@
+"""The agent's camera: where it stands and which way each pixel looks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avn.errors import UserError
+
+
+@dataclass
+class CameraConfig:
+    """A pinhole camera with square pictures, at the centre of the agent's cell.
+
+    Attributes
+    ----------
+    height : float
+        Metres over the floor.
+    pitch : float
+        Degrees upward; negative looks down.
+    fov : float
+        Degrees between the left and the right edge of the picture.
+    size : int
+        Pixels along each side.
+    """
+
+    height: float = 1.5
+    pitch: float = -30.0
+    fov: float = 90.0
+    size: int = 128
+
+
+def ray_directions(
+    camera: CameraConfig, heading: int, size: int, samples: int = 1
+) -> NDArray[np.float64]:
+    """Directions of the rays through each pixel.
+
+    Parameters
+    ----------
+    camera : CameraConfig
+    heading : int
+        0 north, 1 east, 2 south, 3 west.
+    size : int
+        Pixels along each side.
+    samples : int
+        Rays along each side of a pixel, evenly spread.
+
+    Returns
+    -------
+    (size, size, samples ** 2, 3) float64
+        Unit vectors x east, y north, z up. Row 0 is the top of the picture, column 0 its left.
+
+    Raises
+    ------
+    UserError
+        Where the field of view is not between 0 and 180 degrees.
+    """
+    if not 0 < camera.fov < 180:
+        raise UserError(f"renderer.camera.fov: {camera.fov}; give degrees between 0 and 180")
+    fine = size * samples
+    steps = ((np.arange(fine) + 0.5) / fine * 2 - 1) * math.tan(math.radians(camera.fov) / 2)
+    up, right = np.meshgrid(-steps, steps, indexing="ij")
+    pitch = math.radians(camera.pitch)
+    front = math.cos(pitch) - up * math.sin(pitch)
+    z = math.sin(pitch) + up * math.cos(pitch)
+    sin, cos = ((0, 1), (1, 0), (0, -1), (-1, 0))[heading]  # east and north part of the front
+    rays = np.stack((front * sin + right * cos, front * cos - right * sin, z), axis=-1)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    blocks = rays.reshape(size, samples, size, samples, 3).transpose(0, 2, 1, 3, 4)
+    return np.ascontiguousarray(blocks.reshape(size, size, samples * samples, 3))

@@ -1,0 +1,172 @@
+"""`renderer=raycast`: rays through Embree, light baked once an apartment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avn.apartments.floor_plan import FloorPlan
+from avn.views import shading
+from avn.views.camera import ray_directions
+from avn.views.lighting import LightConfig, bake, choose_points, normals_of
+from avn.views.mesh import BUILDING, split
+from avn.views.rays import Triangles
+from avn.views.renderer import Prepared, Renderer, RendererConfig
+from avn.views.scenery import scenery
+
+# Levels of a picture that are skipped where only its colour near a triangle counts.
+_COARSE = 4
+# Brightness that what is seen is exposed to, on average over the eye's scale.
+_KEY = 0.30
+
+
+@dataclass
+class RaycastConfig(RendererConfig):
+    """Settings of `renderer=raycast`.
+
+    Attributes
+    ----------
+    samples : int
+        Rays along each side of a pixel.
+    light : LightConfig
+    """
+
+    _target_: str = "avn.views.raycast.Raycast"
+    name: str = "raycast"
+    samples: int = 2
+    light: LightConfig = field(default_factory=LightConfig)
+
+
+class Raycast(Renderer):
+    """Views by ray casting; see `Renderer`."""
+
+    def __init__(
+        self,
+        cfg: RendererConfig,
+        plan: FloorPlan,
+        part: str,
+        look: int = 0,
+        prepared: Prepared | None = None,
+    ) -> None:
+        assert isinstance(cfg, RaycastConfig)
+        self.cfg = cfg
+        self.scenery = scenery(plan, part, look)
+        # the diagonal of a cell of the grid that light is baked on
+        self.mesh, origin = split(self.scenery.mesh, cfg.light.spacing * math.sqrt(2))
+        self.glow = np.ascontiguousarray(self.scenery.glow[origin])
+        self.shade = self.scenery.shade[origin]
+        self.normal, self.area = normals_of(self.mesh.vertices)
+        self.pyramids = shading.pyramids(self.mesh.textures)
+        self.points = choose_points(self.mesh, cfg.light.spacing)
+        self._triangles = Triangles(self.mesh.vertices)
+        self._prepared = prepared
+        self._lookup = (
+            self.pyramids.texels,
+            self.pyramids.start,
+            self.pyramids.height,
+            self.pyramids.width,
+            shading.LINEAR,
+        )
+        self._density = self._texel_density()
+        camera = cfg.camera
+        self._rays = [self._fan(heading, cfg.samples) for heading in range(4)]
+        self._middles = [self._fan(heading, 1) for heading in range(4)]
+        self._pixel = 2 * math.tan(math.radians(camera.fov) / 2) / camera.size / cfg.samples
+        pitch = math.radians(camera.pitch)
+        sin, cos = np.array([0, 1, 0, -1]), np.array([1, 0, -1, 0])
+        self._axes = np.stack(
+            (math.cos(pitch) * sin, math.cos(pitch) * cos, np.full(4, math.sin(pitch))), axis=1
+        )
+
+    def _fan(self, heading: int, samples: int) -> NDArray[np.float32]:
+        rays = ray_directions(self.cfg.camera, heading, self.cfg.camera.size, samples)
+        return np.ascontiguousarray(rays.reshape(-1, 3).astype(np.float32))
+
+    def _texel_density(self) -> NDArray[np.float32]:
+        """Pixels of its picture for each metre of a triangle, (T,)."""
+        uv = self.mesh.uv.astype(np.float64)
+        a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+        covered = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+        if len(self.mesh.textures):
+            sizes = self.pyramids.height[:, 0] * self.pyramids.width[:, 0]
+            covered = covered * np.where(self.mesh.texture >= 0, sizes[self.mesh.texture], 0)
+        density: NDArray[np.float32] = np.sqrt(covered / np.maximum(self.area, 1e-12)).astype(
+            np.float32
+        )
+        return density
+
+    def albedo(self) -> NDArray[np.float32]:
+        """Linear colour of each triangle about its middle, (T, 3)."""
+        middle = np.ascontiguousarray(self.mesh.uv.mean(axis=1))
+        found: NDArray[np.float32] = shading.sample(
+            middle, self.mesh.texture, self.mesh.colour, _COARSE, *self._lookup
+        )
+        return found
+
+    def prepare(self) -> Prepared:
+        """Irradiance at all corners, and the exposure that suits it."""
+        if self._prepared is None:
+            albedo = self.albedo()
+            light = bake(
+                self.mesh,
+                albedo,
+                self.shade,
+                self.scenery.lamps,
+                self.scenery.panes,
+                self.cfg.light,
+                self.points,
+            )
+            self._prepared = {"light": light, "exposure": np.array(self._exposure(albedo, light))}
+        return self._prepared
+
+    def _exposure(self, albedo: NDArray[np.float32], light: NDArray[np.float32]) -> float:
+        """What brings the middle of what the building shows to a given brightness."""
+        own = (self.mesh.piece == BUILDING) & (self.glow.max(axis=1) == 0)
+        irradiance = light[0][self.points.corner[own]].mean(axis=1)
+        bright = (albedo[own] * irradiance / np.pi) @ np.array((0.2126, 0.7152, 0.0722))
+        logs = np.log(np.maximum(bright, 1e-4))
+        return _KEY / float(np.exp(np.average(logs, weights=self.area[own])))
+
+    def views(
+        self, centres: NDArray[np.float64], headings: NDArray[np.int64]
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float16]]:
+        """See `Renderer.views`."""
+        prepared = self.prepare()
+        size = self.cfg.camera.size
+        rgb = np.empty((len(centres), size, size, 3), dtype=np.uint8)
+        depth = np.empty((len(centres), size, size), dtype=np.float16)
+        for n, (centre, heading) in enumerate(zip(centres, headings, strict=True)):
+            place = np.array((*centre, self.cfg.camera.height), dtype=np.float32)
+            rays = self._rays[heading]
+            hits = self._triangles.meet(np.tile(place, (len(rays), 1)), rays)
+            seen = shading.shade(
+                hits.triangle,
+                hits.u,
+                hits.v,
+                hits.distance,
+                rays,
+                self.cfg.samples**2,
+                self._pixel,
+                self.normal,
+                self._density,
+                self.mesh.uv,
+                self.mesh.texture,
+                self.mesh.colour,
+                self.glow,
+                self.points.corner,
+                prepared["light"],
+                *self._lookup,
+                float(prepared["exposure"]),
+            )
+            rgb[n] = shading.encode(seen).reshape(size, size, 3)
+            depth[n] = self._depth(place, heading).reshape(size, size)
+        return rgb, depth
+
+    def _depth(self, place: NDArray[np.float32], heading: int) -> NDArray[np.float64]:
+        rays = self._middles[heading]
+        hits = self._triangles.meet(np.tile(place, (len(rays), 1)), rays)
+        along: NDArray[np.float64] = hits.distance * (rays @ self._axes[heading])
+        return np.where(hits.triangle < 0, 0.0, along)

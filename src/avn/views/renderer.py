@@ -1,0 +1,92 @@
+"""What every renderer is: it lights an apartment once, and then makes views of its states."""
+
+from __future__ import annotations
+
+import importlib
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from avn.apartments.floor_plan import FloorPlan
+from avn.errors import UserError
+from avn.views.camera import CameraConfig
+
+Prepared = dict[str, NDArray]
+
+
+@dataclass
+class RendererConfig:
+    """The config group `renderer`: what they all have.
+
+    Attributes
+    ----------
+    name : str
+        Names the file of the views.
+    camera : CameraConfig
+    """
+
+    _target_: str = ""
+    name: str = ""
+    camera: CameraConfig = field(default_factory=CameraConfig)
+
+
+class Renderer(ABC):
+    """Makes the views of one apartment.
+
+    Parameters
+    ----------
+    cfg : RendererConfig
+    plan : FloorPlan
+    part : {"train", "validation", "test"}
+        The pool of models, patterns and light.
+    look : int
+        Which draw from the pool.
+    prepared : dict of arrays, optional
+        What `prepare` gave, to save doing it again.
+    """
+
+    @abstractmethod
+    def __init__(
+        self,
+        cfg: RendererConfig,
+        plan: FloorPlan,
+        part: str,
+        look: int = 0,
+        prepared: Prepared | None = None,
+    ) -> None: ...
+
+    @abstractmethod
+    def prepare(self) -> Prepared:
+        """What is worked out once an apartment, such as its light."""
+
+    @abstractmethod
+    def views(
+        self, centres: NDArray[np.float64], headings: NDArray[np.int64]
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float16]]:
+        """Pictures from some places.
+
+        Parameters
+        ----------
+        centres : (N, 2) float64
+            Where the camera stands, metres.
+        headings : (N,) int64
+
+        Returns
+        -------
+        (N, size, size, 3) uint8
+            sRGB, row 0 at the top.
+        (N, size, size) float16
+            Metres along the camera's axis to what the middle of the pixel shows; 0 for nothing.
+        """
+
+
+def renderer_class(cfg: RendererConfig) -> type[Renderer]:
+    """The class that `_target_` names; raises `UserError` where there is none."""
+    module, _, name = cfg._target_.rpartition(".")
+    try:
+        found: type[Renderer] = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise UserError(f"renderer._target_: '{cfg._target_}' cannot be had ({error})") from error
+    return found
