@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import FloorPlan, from_dict
 from avn.apartments.grid import Grid
 from avn.dataset import scene_file
+from avn.dataset.views import Views, read_views
 from avn.errors import UserError
 
 # Raised when the layout of a file changes.
@@ -36,14 +36,6 @@ def first_arrival_file(folder: Path, regime: str) -> Path:
 def geometry_file(folder: Path) -> Path:
     """The file of the floor plan and its grid."""
     return folder / "geometry.h5"
-
-
-def check_shapes(file: h5py.File, path: Path, shapes: dict[str, tuple[int, ...]]) -> None:
-    """Raise `UserError` where a dataset is missing or has another shape than it must."""
-    for name, shape in shapes.items():
-        if name not in file or file[name].shape != shape:
-            found = file[name].shape if name in file else "missing"
-            raise UserError(f"{path}: '{name}' is {found}, not {shape}; make the scene again")
 
 
 class Brirs:
@@ -120,7 +112,7 @@ def _read(
 ) -> tuple[NDArray[np.int16], NDArray[np.float32], dict[str, Any]]:
     with scene_file.open_checked(path, kind, version, made_from) as file:
         samples = file["samples"].shape[-1] if "samples" in file else 0
-        check_shapes(file, path, {"samples": (*pairs, 4, 2, samples), "scale": pairs})
+        scene_file.check_shapes(file, path, {"samples": (*pairs, 4, 2, samples), "scale": pairs})
         marks = dict(file.attrs)
         marks.update({name: file[name][()] for name in ("onset", "cut_db") if name in file})
         scale = file["scale"][()]
@@ -162,6 +154,10 @@ class Scene:
     def brirs(self, regime: str, made_from: str | None = None) -> Brirs:
         """The impulse responses of a regime; raises `UserError` where they are not there."""
         return Brirs(self.folder, regime, len(self.sources), self.grid.cells, made_from)
+
+    def views(self, renderer: str, made_from: str | None = None, look: int = 0) -> Views:
+        """The views by a renderer; raises `UserError` where they are not there."""
+        return read_views(self.folder, renderer, 4 * self.grid.cells, made_from, look)
 
 
 def load(folder: Path, made_from: str | None = None) -> Scene:

@@ -99,6 +99,14 @@ def is_there(path: Path, made_from: str) -> bool:
     return True
 
 
+def check_shapes(file: h5py.File, path: Path, shapes: dict[str, tuple[int, ...]]) -> None:
+    """Raise `UserError` where a dataset is missing or has another shape than it must."""
+    for name, shape in shapes.items():
+        if name not in file or file[name].shape != shape:
+            found = file[name].shape if name in file else "missing"
+            raise UserError(f"{path}: '{name}' is {found}, not {shape}; make the scene again")
+
+
 def _check(
     marks: dict[str, Any], path: Path, kind: str, version: int, made_from: str | None
 ) -> None:

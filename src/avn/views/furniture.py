@@ -7,8 +7,11 @@ from avn.views.drawing import draw
 from avn.views.mesh import Mesh, boxes
 
 try:
-    from avn.views.models import furniture_mesh
+    from avn.views.models import assets_hash, furniture_mesh
 except ImportError:
+
+    def assets_hash() -> str:
+        return "boxes"
 
     def furniture_mesh(plan: FloorPlan, part: str, look: int = 0) -> Mesh:
         lo, hi, col = [], [], []

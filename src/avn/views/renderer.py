@@ -57,6 +57,11 @@ class Renderer(ABC):
         prepared: Prepared | None = None,
     ) -> None: ...
 
+    @classmethod
+    def check_installed(cls) -> None:
+        """Raise `UserError` where something that the renderer needs is not installed."""
+        return
+
     @abstractmethod
     def prepare(self) -> Prepared:
         """What is worked out once an apartment, such as its light."""

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.views.building import building
+from avn.views.furniture import furniture_mesh
 from avn.views.lights import Lamps, Panes, lamps_and_panes, light_of
 from avn.views.mesh import Mesh, join
-from avn.views.furniture import furniture_mesh
 
 
 @dataclass(frozen=True)
