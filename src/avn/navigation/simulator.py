@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -35,6 +37,9 @@ class Simulator:
         What is heard of each source in each state. Which take an episode hears at a step is drawn
         from the seed, the episode and the step, whoever walks. Without it observations have no
         `sound`.
+    sights : mapping of str to (S, ...) tensor, optional
+        What is seen in each state, by the name of the observation: `view`, `depth`, `feature`,
+        `window`.
 
     Attributes
     ----------
@@ -49,7 +54,7 @@ class Simulator:
     Raises
     ------
     ValueError
-        Where `hearing` has another shape.
+        Where `hearing` or one of `sights` has another shape.
     """
 
     def __init__(
@@ -58,6 +63,7 @@ class Simulator:
         episodes: Episodes,
         protocol: Protocol,
         hearing: Tensor | None = None,
+        sights: Mapping[str, Tensor] | None = None,
     ) -> None:
         self.place = place
         self.episodes = episodes
@@ -78,6 +84,10 @@ class Simulator:
         self._frame = self.start % HEADINGS * states
         self._origin = self._seen_from[self._frame + self.start]
         self._hear(hearing)
+        self._sights = dict(sights or {})
+        for name, seen in self._sights.items():
+            if len(seen) != len(self.transitions):
+                raise ValueError(f"'{name}' has {len(seen)} rows for {len(self.transitions)} states")
         self.reset()
 
     def __len__(self) -> int:
@@ -141,12 +151,14 @@ class Simulator:
         TensorDict of batch size N
             `collided` (N,) bool, whether the last action was a blocked move; `odometry` (N, 3)
             int64, cells to the right and to the front and quarter turns clockwise since the start,
-            in the frame of the start; with hearing also `sound` (N, D).
+            in the frame of the start; with hearing also `sound` (N, D), and with sights what is
+            seen, by name.
         """
         odometry = self._seen_from[self._frame + self.state] - self._origin
         observation = {"collided": self._collided.clone(), "odometry": odometry}
         if self._hearing is not None:
             observation["sound"] = self._hearing[self._clip()]
+        observation |= {name: seen[self.state] for name, seen in self._sights.items()}
         return TensorDict(observation, batch_size=[len(self)])
 
     def _end(self, running: Tensor, actions: Tensor) -> None:

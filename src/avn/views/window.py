@@ -1,0 +1,141 @@
+"""The window: the 5 x 5 cells in front of the agent, and which of them its camera sees."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from avn.apartments.floor_plan import CELL
+from avn.apartments.grid import STEPS, Grid
+from avn.apartments.surfaces import Surfaces
+from avn.apartments.walls import HEADROOM
+from avn.views.camera import CameraConfig, ray_directions
+
+# Rows 1 to 5 ahead, columns -2 to 2 to the right.
+WINDOW = 5
+SIDE = WINDOW // 2
+# Rays across a picture with which visibility is looked for; a cell ahead is 3 rays wide or more.
+RAYS = 40
+# A ray goes on for half a wall behind what it meets, so that it enters the wall's own cell.
+_INTO = 0.06
+_STRIDE = 0.05
+
+
+def window_offsets() -> NDArray[np.int32]:
+    """Where the cells of the window lie, (5, 5, 2) int32: cells to the right and to the front.
+
+    Row 0 is the nearest, column 0 the leftmost.
+    """
+    front, right = np.meshgrid(np.arange(1, WINDOW + 1), np.arange(-SIDE, SIDE + 1), indexing="ij")
+    return np.stack((right, front), axis=-1).astype(np.int32)
+
+
+def window_cells(grid: Grid) -> NDArray[np.int32]:
+    """The free cells of the window of every state.
+
+    Parameters
+    ----------
+    grid : Grid
+        C free cells.
+
+    Returns
+    -------
+    (4 C, 5, 5) int32
+        Cell, or -1 where the square is not free. Row r is r + 1 cells ahead, column c is c - 2
+        cells to the right.
+    """
+    lattice, offsets = grid.lattice, window_offsets()
+    low = lattice.min(axis=0) - WINDOW
+    number = np.full(np.ptp(lattice, axis=0) + 2 * WINDOW + 1, -1, dtype=np.int32)
+    number[tuple((lattice - low).T)] = np.arange(len(lattice))
+    ahead = STEPS[:, None, None] * offsets[..., 1:]
+    aside = np.roll(STEPS, -1, axis=0)[:, None, None] * offsets[..., :1]
+    squares = (lattice - low)[:, None, None, None] + ahead + aside
+    return number[squares[..., 0], squares[..., 1]].reshape(-1, WINDOW, WINDOW)
+
+
+def visible_cells(surfaces: Surfaces, grid: Grid, camera: CameraConfig) -> NDArray[np.bool_]:
+    """Which cells of the window are visible from every state.
+
+    A cell is visible where some of its volume below the height of a person is in the picture and
+    nothing hides it; what stands in the cell counts as the cell's own.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+    grid : Grid
+        C free cells.
+    camera : CameraConfig
+
+    Returns
+    -------
+    (4 C, 5, 5) bool
+    """
+    rays = np.stack([ray_directions(camera, h, RAYS).reshape(-1, 3) for h in range(4)])
+    return _seen(
+        surfaces.axis,
+        surfaces.offset,
+        surfaces.lower,
+        surfaces.upper,
+        grid.centres,
+        camera.height,
+        rays,
+    )
+
+
+@numba.njit(cache=True)
+def _seen(
+    axis: NDArray[np.int8],
+    offset: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    height: float,
+    rays: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    seen = np.zeros((4 * len(centres), WINDOW, WINDOW), dtype=np.bool_)
+    reach = CELL * (WINDOW + 1) * 1.5
+    for state in range(4 * len(centres)):
+        cell, heading = state // 4, state % 4
+        origin = np.array([centres[cell, 0], centres[cell, 1], height])
+        # unit vectors (east, north) to the front and to the right
+        fx, fy = (heading == 1) * 1.0 - (heading == 3), (heading == 0) * 1.0 - (heading == 2)
+        for n in range(rays.shape[1]):
+            ray = rays[heading, n]
+            end = min(_hit(axis, offset, lower, upper, origin, ray), reach) + _INTO
+            t = _STRIDE
+            while t <= end:
+                x, y, z = t * ray[0], t * ray[1], height + t * ray[2]
+                row = int(np.rint((x * fx + y * fy) / CELL)) - 1
+                column = int(np.rint((x * fy - y * fx) / CELL)) + SIDE
+                if z < HEADROOM and 0 <= row < WINDOW and 0 <= column < WINDOW:
+                    seen[state, row, column] = True
+                t += _STRIDE
+    return seen
+
+
+@numba.njit(cache=True)
+def _hit(
+    axis: NDArray[np.int8],
+    offset: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    ray: NDArray[np.float64],
+) -> float:
+    """Metres along a ray to the first surface; infinite where there is none."""
+    nearest = np.inf
+    for q in range(len(axis)):
+        a = axis[q]
+        if ray[a] == 0.0:
+            continue
+        t = (offset[q] - origin[a]) / ray[a]
+        if t <= 0.0 or t >= nearest:
+            continue
+        b = 1 if a == 0 else 0
+        c = 1 if a == 2 else 2
+        u, v = origin[b] + t * ray[b], origin[c] + t * ray[c]
+        if lower[q, 0] <= u <= upper[q, 0] and lower[q, 1] <= v <= upper[q, 1]:
+            nearest = t
+    return nearest
