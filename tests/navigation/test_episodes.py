@@ -55,41 +55,53 @@ def test_starts_lie_outside_the_goal_and_differ(
     assert set((episodes.start % 4).tolist()) == {0, 1, 2, 3}
 
 
-def test_starts_lie_outside_the_exploration_walk(protocols: dict[str, Protocol]) -> None:
+def test_starts_lie_outside_the_one_walk_of_a_room(protocols: dict[str, Protocol]) -> None:
     hall = draw("hall", HALL)
     rules = dataclasses.replace(protocols["var"], exploration=400)
-    episodes = frozen_episodes(hall, ["ring"], rules, seed=0)
-    assert [len(walk) for walk in episodes.walks] == [401, 401]
-    for source, walk in enumerate(episodes.walks):
-        own = episodes.start[episodes.source == source]
-        assert len(own) == 20
-        assert not set(own // 4) & set(walk // 4)
-    assert (episodes.walks[0] != episodes.walks[1]).any()
+    episodes = frozen_episodes(hall, SOUNDS, rules, seed=0)
+    assert episodes.walks.shape == (1, 401)
+    assert (episodes.walk == 0).all()
+    assert not set(episodes.start // 4) & set(episodes.walks[0] // 4)
+    pairs = set(zip(episodes.source.tolist(), episodes.start.tolist(), strict=True))
+    assert len(pairs) == 40
 
 
-def test_a_walk_that_leaves_too_few_starts_is_drawn_again_and_then_cut(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+def test_own_walks_differ_and_leave_their_start_unexplored(protocols: dict[str, Protocol]) -> None:
+    hall = draw("hall", HALL)
+    rules = dataclasses.replace(protocols["var"], exploration=400)
+    episodes = frozen_episodes(hall, SOUNDS, rules, seed=0, exploration="own")
+    assert episodes.walks.shape == (40, 401)
+    assert len(np.unique(episodes.walks, axis=0)) == 40
+    walked = episodes.walks[episodes.walk] // 4
+    assert not (walked == (episodes.start // 4)[:, None]).any()
+    goal = rules.goal_cells(hall.grid, hall.sources)
+    assert not goal[episodes.source, episodes.start // 4].any()
+    assert len(np.unique(episodes.start)) > 30
+
+
+@pytest.mark.parametrize("exploration", ["shared", "own"])
+def test_a_walk_that_leaves_too_few_starts_is_cut(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol], exploration: str
 ) -> None:
-    # No walk of 5,000 steps leaves a cell of 51; it is cut where five cells are left.
+    # No walk of 5,000 steps leaves a cell of 51; it is cut where enough cells are left.
     rules = dataclasses.replace(protocols["var"], exploration=5000)
-    episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
+    episodes = frozen_episodes(two_rooms, ["ring"], rules, 0, exploration)
     goal = rules.goal_cells(two_rooms.grid, two_rooms.sources)
-    for source, walk in enumerate(episodes.walks):
-        assert 0 < len(walk) < 5000
-        left = ~goal[source]
-        left[walk // 4] = False
-        assert left.sum() == 5
-        own = episodes.start[episodes.source == source]
-        assert set((own // 4).tolist()) == set(np.flatnonzero(left).tolist())
+    least = 5 if exploration == "shared" else 1
+    fewest = []
+    for number in range(len(episodes)):
+        left = ~goal[episodes.source[number]]
+        left[episodes.walks[episodes.walk[number]] // 4] = False
+        assert left[episodes.start[number] // 4]
+        fewest.append(left.sum())
+    assert min(fewest) == least
 
 
-def test_visited_cells_of_another_walk_are_no_starts(
+def test_unknown_exploration_is_refused(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
-    visited = np.zeros(51, dtype=bool)
-    visited[:20] = True
-    episodes = frozen_episodes(two_rooms, ["ring"], protocols["var"], 0, visited)
-    assert (episodes.start // 4).min() >= 20
+    with pytest.raises(UserError, match="exploration: 'none' is none of shared, own"):
+        frozen_episodes(two_rooms, ["ring"], protocols["var"], 0, "none")
 
 
 def test_exhaustive_takes_every_start(

@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 
 from avn.errors import UserError
 from avn.navigation.actions import HEADINGS
-from avn.navigation.exploration import explore, first_visits
+from avn.navigation.exploration import EXPLORATIONS, own_walks, shared_walk
 from avn.navigation.hashing import derive, scramble
 from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
-
-# Draws of the exploration walk before it is cut short instead.
-TRIES = 16
 
 
 @dataclass(frozen=True)
@@ -33,8 +30,10 @@ class Episodes:
         The episode's number in the room; the same for all sounds.
     sound, source, start : (N,) int64
         Index into `sounds`, index into the place's sources, state where the agent begins.
-    walks : tuple of arrays of int64
-        The exploration walk of each source, as states; empty where there is none.
+    walks : (W, T) int64
+        Exploration walks as states; W = 0 where there is none.
+    walk : (N,) int64
+        Which of them belongs to each episode; -1 for none.
     """
 
     room: str
@@ -44,7 +43,8 @@ class Episodes:
     sound: NDArray[np.int64]
     source: NDArray[np.int64]
     start: NDArray[np.int64]
-    walks: tuple[NDArray[np.int64], ...] = ()
+    walks: NDArray[np.int64]
+    walk: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.start)
@@ -62,15 +62,15 @@ def frozen_episodes(
     sounds: Sequence[str],
     protocol: Protocol,
     seed: int,
-    visited: NDArray[np.bool_] | None = None,
+    exploration: str = "shared",
 ) -> Episodes:
     """The frozen list of a room: `protocol.starts` episodes for each source and sound.
 
     Starts are drawn uniformly, without repeats, from the states that are neither at the goal nor
-    on the exploration walk of their source. The list is a function of the seed, the room's name
-    and its grid: all agents and all sounds get the same. A walk that leaves too few starts is
-    drawn again, up to 16 times; in an apartment so small that every walk covers it, the first one
-    is cut short where it would take the last starts.
+    on the exploration walk. The list is a function of the seed, the room's name and its grid: all
+    agents and all sounds get the same. A walk that leaves too few starts is drawn again, up to 16
+    times; in an apartment so small that every walk covers it, the first one is cut short where it
+    would take the last starts.
 
     Parameters
     ----------
@@ -78,33 +78,54 @@ def frozen_episodes(
     sounds : sequence of str
     protocol : Protocol
     seed : int
-    visited : (C,) or (K, C) bool, optional
-        Cells of a walk that was made elsewhere, which takes the place of the drawn one.
+    exploration : {"shared", "own"}
+        One walk for all episodes of the room, or one for each start, so that no two episodes
+        know the same; then a state may be the start of two episodes.
 
     Raises
     ------
     UserError
         Where the room has fewer starts than `protocol.starts` for one of its sources.
     """
+    if exploration not in EXPLORATIONS:
+        raise UserError(f"exploration: '{exploration}' is none of {', '.join(EXPLORATIONS)}")
     grid, sources = place.grid, np.asarray(place.sources)
     cells, wanted = len(grid.lattice), protocol.starts
-    allowed = ~protocol.goal_cells(grid, sources)
-    if visited is not None:
-        allowed = allowed & ~visited
-    _check_enough(place.name, allowed, wanted)
-    walks: tuple[NDArray[np.int64], ...] = ()
-    if visited is None and protocol.exploration:
-        walks, allowed = _explored(place, allowed, protocol, seed)
-    states = np.arange(HEADINGS * cells)
-    keys = _source_keys("starts", seed, place)
+    goal = protocol.goal_cells(grid, sources)
+    _check_enough(place.name, ~goal, wanted)
+    source = np.repeat(np.arange(len(sources)), wanted)
     # The order of all states is drawn first and then sifted, so that protocols and walks that
     # allow nearly the same starts get nearly the same ones.
+    states = np.arange(HEADINGS * cells)
+    keys = _source_keys("starts", seed, place)
     order = np.argsort(scramble(keys[:, None], states[None, :]), axis=1, kind="stable")
+    walk_key = np.uint64(derive("exploration", seed, place.name))
+    if not protocol.exploration:
+        walks, walk = np.empty((0, 1), dtype=np.int64), np.full(len(source), -1)
+        starts = _first_allowed(order, ~goal, wanted)
+    elif exploration == "shared":
+        shared, left = shared_walk(grid.neighbours, ~goal, walk_key, protocol.exploration, wanted)
+        walks, walk = shared[None], np.zeros(len(source), dtype=np.int64)
+        starts = _first_allowed(order, left, wanted)
+    else:
+        each = np.arange(len(source))
+        walks, left = own_walks(
+            grid.neighbours, ~goal[source], scramble(walk_key, each), protocol.exploration
+        )
+        walk, turned = each, (np.arange(wanted)[:, None] + states) % len(states)
+        # every start of a source looks through the same order from another place on
+        own = order[:, turned].reshape(len(source), -1)
+        starts = _first_allowed(own, left, 1)
+    return _over_sounds(place, sounds, seed, source, starts.reshape(-1), walks, walk)
+
+
+def _first_allowed(
+    order: NDArray[np.int64], allowed: NDArray[np.bool_], wanted: int
+) -> NDArray[np.int64]:
+    """The first states of each row of `order`, (R, S), whose cells are allowed, (R, C)."""
     kept = np.take_along_axis(allowed, order // HEADINGS, axis=1)
     first = np.argsort(~kept, axis=1, kind="stable")[:, :wanted]
-    starts = np.take_along_axis(order, first, axis=1)
-    source = np.repeat(np.arange(len(sources)), wanted)
-    return _over_sounds(place, sounds, seed, source, starts.reshape(-1), walks)
+    return np.take_along_axis(order, first, axis=1)
 
 
 def exhaustive_episodes(
@@ -117,7 +138,8 @@ def exhaustive_episodes(
     allowed = ~protocol.goal_cells(place.grid, np.asarray(place.sources))
     _check_enough(place.name, allowed, 1)
     source, start = np.nonzero(np.repeat(allowed, HEADINGS, axis=1))
-    return _over_sounds(place, sounds, seed, source, start, ())
+    none = np.empty((0, 1), dtype=np.int64)
+    return _over_sounds(place, sounds, seed, source, start, none, np.full(len(source), -1))
 
 
 def _check_enough(room: str, allowed: NDArray[np.bool_], wanted: int) -> None:
@@ -135,35 +157,14 @@ def _source_keys(purpose: str, seed: int, place: Place) -> NDArray[np.uint64]:
     return scramble(key, np.arange(len(place.sources)))
 
 
-def _explored(
-    place: Place, allowed: NDArray[np.bool_], protocol: Protocol, seed: int
-) -> tuple[tuple[NDArray[np.int64], ...], NDArray[np.bool_]]:
-    """The exploration walk of each source, and which cells it leaves as starts, (K, C)."""
-    sources, cells = allowed.shape
-    keys = scramble(_source_keys("exploration", seed, place)[:, None], np.arange(TRIES)[None, :])
-    tried = explore(place.grid.neighbours, keys.reshape(-1), protocol.exploration)
-    tried = tried.reshape(sources, TRIES, -1)
-    least = -(-protocol.starts // HEADINGS)
-    walks, left = [], []
-    for own, free in zip(tried, allowed, strict=True):
-        visits = first_visits(own, cells)
-        unvisited = (visits > protocol.exploration) & free
-        # The first try that leaves enough, or try 0, which is then cut.
-        chosen = int(np.argmax(unvisited.sum(axis=1) >= least))
-        # Cut at the step when the walk would take one of the last cells that are needed.
-        end = int(np.sort(visits[chosen][free])[-least])
-        walks.append(own[chosen][:end])
-        left.append(free & (visits[chosen] >= end))
-    return tuple(walks), np.stack(left)
-
-
 def _over_sounds(
     place: Place,
     sounds: Sequence[str],
     seed: int,
     source: NDArray[np.int64],
     start: NDArray[np.int64],
-    walks: tuple[NDArray[np.int64], ...],
+    walks: NDArray[np.int64],
+    walk: NDArray[np.int64],
 ) -> Episodes:
     """The same starts for every sound."""
     if not sounds:
@@ -178,4 +179,5 @@ def _over_sounds(
         source=np.tile(source.astype(np.int64), times),
         start=np.tile(start.astype(np.int64), times),
         walks=walks,
+        walk=np.tile(walk.astype(np.int64), times),
     )

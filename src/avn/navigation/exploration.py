@@ -6,9 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.navigation.actions import FORWARD, HEADINGS, ROTATE_LEFT, ROTATE_RIGHT, transitions
-from avn.navigation.hashing import uniform
+from avn.navigation.hashing import scramble, uniform
 
 FORWARD_SHARE = 0.5
+# Draws of a walk before it is cut short instead.
+TRIES = 16
+EXPLORATIONS = ("shared", "own")
 
 
 def explore(
@@ -55,3 +58,77 @@ def first_visits(walks: NDArray[np.int64], cells: int) -> NDArray[np.int64]:
     walk, step = np.indices(walks.shape)
     np.minimum.at(visits, (walk, walks // HEADINGS), step)
     return visits
+
+
+def shared_walk(
+    neighbours: NDArray[np.int32],
+    allowed: NDArray[np.bool_],
+    key: np.uint64,
+    steps: int,
+    starts: int,
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """One walk for all episodes of a room, and which cells it leaves as starts.
+
+    Parameters
+    ----------
+    neighbours : (C, 4) int
+    allowed : (K, C) bool
+        Where episodes of each source could begin.
+    key : uint64
+    steps, starts : int
+        Length of the walk, and how many states it has to leave for each source.
+
+    Returns
+    -------
+    walk : (T,) int64
+        States; T is `steps` + 1, or less where it was cut short.
+    left : (K, C) bool
+    """
+    least = -(-starts // HEADINGS)
+    walks, visits = _tries(neighbours, scramble(key, np.arange(TRIES)), steps)
+    unvisited = (visits > steps)[:, None] & allowed
+    # The first try that leaves enough, or try 0, which is then cut.
+    chosen = int(np.argmax((unvisited.sum(axis=2) >= least).all(axis=1)))
+    end = min(_last_step(visits[chosen], own, least) for own in allowed)
+    return walks[chosen, :end], allowed & (visits[chosen] >= end)
+
+
+def own_walks(
+    neighbours: NDArray[np.int32], allowed: NDArray[np.bool_], keys: NDArray[np.uint64], steps: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """A walk for each of N episodes, and which cells it leaves as starts.
+
+    Parameters
+    ----------
+    neighbours : (C, 4) int
+    allowed : (N, C) bool
+        Where each episode could begin.
+    keys : (N,) uint64
+    steps : int
+
+    Returns
+    -------
+    walks : (N, steps + 1) int64
+        States; a walk that was cut short stays where it ended.
+    left : (N, C) bool
+    """
+    count = len(keys)
+    tries = scramble(keys[:, None], np.arange(TRIES)[None]).reshape(-1)
+    walks, visits = (part.reshape(count, TRIES, -1) for part in _tries(neighbours, tries, steps))
+    chosen = ((visits > steps) & allowed[:, None]).any(axis=2).argmax(axis=1)
+    walk, visit = walks[np.arange(count), chosen], visits[np.arange(count), chosen]
+    ends = np.array([_last_step(v, own, 1) for v, own in zip(visit, allowed, strict=True)])
+    kept = np.minimum(np.arange(steps + 1), ends[:, None] - 1)
+    return np.take_along_axis(walk, kept, axis=1), allowed & (visit >= ends[:, None])
+
+
+def _tries(
+    neighbours: NDArray[np.int32], keys: NDArray[np.uint64], steps: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    walks = explore(neighbours, keys, steps)
+    return walks, first_visits(walks, len(neighbours))
+
+
+def _last_step(visits: NDArray[np.int64], allowed: NDArray[np.bool_], least: int) -> int:
+    """Steps that a walk may have to leave so many allowed cells unvisited."""
+    return int(np.sort(visits[allowed])[-least])
