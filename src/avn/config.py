@@ -18,6 +18,7 @@ from avn.agents.base import BaselineConfig
 from avn.agents.greedy import GreedyConfig
 from avn.apartments.splits import SplitConfig
 from avn.modules.sound_cnn import SoundModelConfig
+from avn.modules.stop_classifier import StopModelConfig
 from avn.navigation.protocols import ProtocolConfig
 
 
@@ -45,6 +46,7 @@ class CoreConfig:
     microphone: MicrophoneConfig = MISSING
     sound: dict[str, str] = MISSING
     sound_model: SoundModelConfig = MISSING
+    stop_model: StopModelConfig = MISSING
     protocol: ProtocolConfig = MISSING
     baseline: BaselineConfig = MISSING
     takes: int = MISSING
@@ -102,6 +104,7 @@ SCHEMAS = {
     ("acoustics", "schema"): AcousticsConfig,
     ("microphone", "schema"): MicrophoneConfig,
     ("sound_model", "schema"): SoundModelConfig(train_seed=_SEED),
+    ("stop_model", "schema"): StopModelConfig(train_seed=_SEED),
     ("protocol", "schema"): ProtocolConfig,
     ("baseline", "schema"): BaselineConfig,
     ("baseline", "greedy_schema"): GreedyConfig,

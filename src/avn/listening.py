@@ -1,37 +1,43 @@
-"""The sound network of a config and what it hears, made where they are missing."""
+"""What listens, and what it makes of every clip, made where it is missing.
+
+Two networks listen: the sound network, which says where the source is, and the stop classifier,
+which says whether it is within reach.
+"""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
 import torch
 from hydra.utils import instantiate
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
 from avn import pipeline
-from avn.acoustics.clips import DrySounds, MicrophoneConfig
+from avn.acoustics.clips import DrySounds
 from avn.acoustics.dry_sounds import BUILTIN, content_hash, load_sounds
 from avn.datamodules.sound import SoundData
-from avn.dataset import build, scene_file
+from avn.datamodules.stop import StopData
+from avn.dataset import build
 from avn.dataset.scene import Scene
 from avn.errors import UserError
-from avn.modules import training
+from avn.learned import Outcome, read_metrics, trained
 from avn.modules.hearing import hear
+from avn.modules.listener import Listener
 from avn.modules.sound_cnn import SoundCnn
+from avn.modules.stop_classifier import StopClassifier, check_decision
+from avn.modules.stop_metrics import CRITERIA, StopScores, best_threshold
+from avn.navigation.protocols import Protocol
+from avn.progress import progress_bar
 from avn.reporting.results import ALL_SOUNDS
-from avn.stages import check_name, digest, file_hash, make_once, stage_folder, written_whole
+from avn.stages import check_name, digest, stage_folder
 
 # Raised when the code of a stage changes its result.
-VERSIONS = {"sound_cnn": 1, "hear": 1}
+VERSIONS = {"sound_cnn": 1, "hear": 1, "stop_classifier": 1, "stop": 1}
 # What networks are trained on, whatever `sound=` says.
 TRAINING_SOUNDS = {name: name for name in BUILTIN}
-METRICS, CHECKSUM = "metrics.json", "best.ckpt sha256"
 # Draws the takes of what is heard; an episode draws among them from its own seed.
 HEARING_SEED = 0
 MOST_TAKES = 1000
@@ -40,6 +46,11 @@ MOST_TAKES = 1000
 def hears(cfg: DictConfig) -> bool:
     """Whether the config has a sound model."""
     return bool(cfg.sound_model.name != "none")
+
+
+def can_stop(cfg: DictConfig) -> bool:
+    """Whether the config has a stop classifier."""
+    return bool(cfg.stop_model.name != "none")
 
 
 def sound_files(cfg: DictConfig) -> dict[str, str]:
@@ -60,13 +71,25 @@ def sound_files(cfg: DictConfig) -> dict[str, str]:
 
 def model_hash(cfg: DictConfig) -> str:
     """Hash of what the sound network's weights depend on."""
+    return digest(*_set_hash(cfg), cfg.sound_model, VERSIONS["sound_cnn"])
+
+
+def stop_model_hash(cfg: DictConfig) -> str:
+    """Hash of what the stop classifier's weights depend on; how it decides is no part of it."""
+    recipe: Any = OmegaConf.to_container(cfg.stop_model, resolve=True)
+    recipe = {key: recipe[key] for key in recipe if key not in ("criterion", "threshold")}
+    goal = (cfg.protocol.goal, cfg.protocol.radius if cfg.protocol.goal == "radius" else None)
+    return digest(*_set_hash(cfg), goal, recipe, VERSIONS["stop_classifier"])
+
+
+def _set_hash(cfg: DictConfig) -> tuple[Any, ...]:
+    """What every network that listens is trained on, for its hash."""
     acoustics = pipeline.acoustics_of(cfg)
     apartments = {
         part: [build.first_arrival_hash(plan, acoustics) for plan in pipeline.plans(cfg)[part]]
         for part in ("train", "validation")
     }
-    sounds = content_hash(TRAINING_SOUNDS)
-    return digest(apartments, sounds, cfg.microphone, cfg.sound_model, VERSIONS["sound_cnn"])
+    return apartments, content_hash(TRAINING_SOUNDS), cfg.microphone
 
 
 def sound_model(cfg: DictConfig, asked: bool = False) -> tuple[SoundCnn, Path]:
@@ -87,62 +110,98 @@ def sound_model(cfg: DictConfig, asked: bool = False) -> tuple[SoundCnn, Path]:
     torch.manual_seed(cfg.sound_model.train_seed)
     model: SoundCnn = instantiate(cfg.sound_model)
     folder = stage_folder(cfg.outputs, "train", "sound_cnn", model_hash(cfg))
-    make_once(
-        folder,
-        f"sound network '{cfg.sound_model.name}' ({cfg.acoustics.name})",
-        done=(folder / METRICS).is_file,
-        make=lambda: _fit(cfg, model, folder),
-        auto=cfg.auto or asked,
-        estimate="a few minutes",
-    )
-    best = folder / training.BEST
-    training.load_weights(model, best)
-    if read_metrics(folder).get(CHECKSUM) != file_hash(best):
-        raise UserError(f"{best}: changed since it was trained; delete {folder} to train again")
-    return model, folder
+    title = f"sound network '{cfg.sound_model.name}' ({cfg.acoustics.name})"
+
+    def data() -> SoundData:
+        return SoundData(**_training_set(cfg), recipe=pipeline.typed(cfg.sound_model))
+
+    return trained(cfg, model, folder, title, data, asked=asked), folder
 
 
-def read_metrics(folder: Path) -> dict[str, Any]:
-    """What a training measured; raises `UserError` where the file is damaged."""
-    try:
-        return dict(json.loads((folder / METRICS).read_text()))
-    except (OSError, ValueError) as error:
-        raise UserError(f"{folder / METRICS}: damaged; delete {folder} to train again") from error
+def stop_model(cfg: DictConfig, asked: bool = False) -> tuple[StopClassifier, Path]:
+    """The trained stop classifier and its folder; as `sound_model`.
+
+    The goal that it knows is that of the protocol: its 3 x 3 cells, or its radius.
+    """
+    if not can_stop(cfg):
+        raise UserError("stop_model: 'none' cannot say Stop; choose cnn5")
+    protocol: Protocol = instantiate(cfg.protocol)
+    model: StopClassifier = instantiate(cfg.stop_model)
+    folder = stage_folder(cfg.outputs, "train", "stop_classifier", stop_model_hash(cfg))
+    title = f"stop classifier '{cfg.stop_model.name}' ({cfg.acoustics.name}, {protocol.goal})"
+
+    def data() -> StopData:
+        return StopData(
+            **_training_set(cfg),
+            recipe=pipeline.typed(cfg.stop_model),
+            goal=lambda scene: protocol.goal_cells(scene.grid, scene.sources),
+        )
+
+    return trained(cfg, model, folder, title, data, _stop_figures, asked), folder
 
 
-def _fit(cfg: DictConfig, model: SoundCnn, folder: Path) -> None:
-    opened = pipeline.scenes(cfg, ("train", "validation"), audible=True)
-    data = SoundData(
-        opened["train"],
-        opened["validation"],
-        cfg.acoustics.name,
-        DrySounds(load_sounds(TRAINING_SOUNDS)),
-        pipeline.typed(cfg.microphone),
-        pipeline.typed(cfg.sound_model),
-    )
-    metrics = training.fit(data, model, folder)
-    metrics[CHECKSUM] = file_hash(folder / training.BEST)
-    with written_whole(folder / METRICS) as part:
-        part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+def _training_set(cfg: DictConfig) -> dict[str, Any]:
+    """What every network that listens is trained on, for its data module."""
+    return {
+        **pipeline.scenes(cfg, ("train", "validation"), audible=True),
+        "regime": cfg.acoustics.name,
+        "sounds": DrySounds(load_sounds(TRAINING_SOUNDS)),
+        "microphone": pipeline.typed(cfg.microphone),
+    }
+
+
+def _stop_figures(model: StopClassifier, data: StopData) -> dict[str, Any]:
+    """Thresholds and error rates over one take of every clip of the validation apartments."""
+    clips = data.measured_clips["validation"]
+    scores = StopScores(data.sounds.names)
+    with torch.inference_mode(), progress_bar("choosing a threshold", len(clips), "clips") as done:
+        for batch in data.loader(clips, list(range(len(clips)))):
+            said = torch.sigmoid(model.log_odds(batch["pictures"].to(model.device))).cpu()
+            scores.update(said, batch["target"], batch["in_sight"], batch["sound"])
+            done(len(said))
+    figures: dict[str, Any] = {}
+    for name, value in scores.compute().items():
+        kind, group = name.split("/", 1)
+        figures[f"{kind}/validation/{group}"] = float(value)
+    for criterion in CRITERIA:
+        threshold = best_threshold(*scores.scores(), criterion)
+        figures[f"threshold/{criterion}"] = threshold
+        for name, rate in scores.at(threshold).items():
+            kind, group = name.split("/", 1)
+            figures[f"{kind}/{criterion}/{group}"] = rate
+    return figures
+
+
+def stop_threshold(cfg: DictConfig) -> float:
+    """The probability from which on the agent stops: the config's, or the one that was chosen.
+
+    Raises
+    ------
+    UserError
+        Where `stop_model.threshold` or `stop_model.criterion` cannot work.
+    """
+    check_decision(cfg.stop_model.criterion, cfg.stop_model.threshold)
+    if cfg.stop_model.threshold is not None:
+        return float(cfg.stop_model.threshold)
+    _, folder = stop_model(cfg)
+    return float(read_metrics(folder)[f"threshold/{cfg.stop_model.criterion}"])
 
 
 def hear_hash(cfg: DictConfig) -> str:
     """Hash of what is heard, beside the apartment: network, sounds in their order, takes."""
+    return digest(model_hash(cfg), *_heard_clips(cfg), VERSIONS["hear"])
+
+
+def stop_hash(cfg: DictConfig) -> str:
+    """Hash of the stop classifier's scores, beside the apartment; as `hear_hash`."""
+    return digest(stop_model_hash(cfg), *_heard_clips(cfg), VERSIONS["stop"])
+
+
+def _heard_clips(cfg: DictConfig) -> tuple[Any, ...]:
+    """Which clips are listened to, for a hash."""
     if not 1 <= cfg.takes <= MOST_TAKES:
         raise UserError(f"takes: {cfg.takes} is out of range; give 1 to {MOST_TAKES}")
-    sounds = list(content_hash(sound_files(cfg)).items())
-    return digest(model_hash(cfg), sounds, cfg.takes, HEARING_SEED, VERSIONS["hear"])
-
-
-@dataclass(frozen=True)
-class _Ears:
-    """Everything that what is heard in a scene depends on."""
-
-    model: SoundCnn
-    sounds: dict[str, str]
-    regime: str
-    microphone: MicrophoneConfig
-    takes: int
+    return list(content_hash(sound_files(cfg)).items()), cfg.takes, HEARING_SEED
 
 
 def hearing(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
@@ -154,50 +213,63 @@ def hearing(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
         Metres to the right and to the front.
     """
     model, _ = sound_model(cfg)
-    sounds = sound_files(cfg)
-    ears = _Ears(model, sounds, cfg.acoustics.name, pipeline.typed(cfg.microphone), cfg.takes)
+    outcome = Outcome(
+        stage="hear",
+        what="-".join(sound_files(cfg)),
+        kind="hearing",
+        dataset="estimates",
+        version=VERSIONS["hear"],
+        made_from=hear_hash(cfg),
+        title=f"what '{cfg.sound_model.name}' hears",
+        estimate=_listening_time(cfg, chosen),
+    )
+    return _listen(cfg, chosen, model, outcome)
+
+
+def stop_scores(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
+    """How likely every clip of each scene is heard at the goal, made where it is missing.
+
+    The takes are those of `hearing`.
+
+    Returns
+    -------
+    list of (K, S, sounds, takes) float32
+        Probability that the source is within reach.
+    """
+    model, _ = stop_model(cfg)
+    outcome = Outcome(
+        stage="stop",
+        what="-".join(sound_files(cfg)),
+        kind="stop",
+        dataset="probabilities",
+        version=VERSIONS["stop"],
+        made_from=stop_hash(cfg),
+        title=f"where stop classifier '{cfg.stop_model.name}' would stop",
+        estimate=_listening_time(cfg, chosen),
+    )
+    return _listen(cfg, chosen, model, outcome)
+
+
+def _listening_time(cfg: DictConfig, chosen: Sequence[Scene]) -> str:
+    clips = sum(4 * s.grid.cells * len(s.sources) for s in chosen) * len(cfg.sound) * cfg.takes
+    return f"about {max(1, clips // 800)} s"
+
+
+def _listen(
+    cfg: DictConfig, chosen: Sequence[Scene], model: Listener, outcome: Outcome
+) -> list[Tensor]:
     acoustics = pipeline.acoustics_of(cfg)
-    made_from = hear_hash(cfg)
-    target = stage_folder(cfg.outputs, "hear", "-".join(sounds), made_from)
-    clips = sum(4 * s.grid.cells * len(s.sources) for s in chosen) * len(sounds) * cfg.takes
-    hashes = [digest(made_from, build.first_arrival_hash(s.plan, acoustics)) for s in chosen]
-    names = zip(chosen, hashes, strict=True)
-    paths = [target / f"{which.name}-{own[:8]}.h5" for which, own in names]
 
-    def make() -> None:
-        for which, path, own in zip(chosen, paths, hashes, strict=True):
-            if not path.is_file():
-                _write_hearing(which, path, own, ears)
+    def listen(scene: Scene) -> Tensor:
+        return hear(
+            scene,
+            acoustics.name,
+            DrySounds(load_sounds(sound_files(cfg))),
+            model,
+            cfg.takes,
+            pipeline.typed(cfg.microphone),
+            seed=HEARING_SEED,
+        )
 
-    make_once(
-        target,
-        f"what '{cfg.sound_model.name}' hears in {', '.join(s.name for s in chosen)}",
-        done=lambda: all(path.is_file() for path in paths),
-        make=make,
-        auto=cfg.auto,
-        estimate=f"about {max(1, clips // 800)} s",
-    )
-    return [_read_hearing(path, own) for path, own in zip(paths, hashes, strict=True)]
-
-
-def _write_hearing(which: Scene, path: Path, made_from: str, ears: _Ears) -> None:
-    sounds = DrySounds(load_sounds(ears.sounds))
-    heard = hear(
-        which,
-        ears.regime,
-        sounds,
-        ears.model,
-        ears.takes,
-        ears.microphone,
-        seed=HEARING_SEED,
-    )
-
-    def fill(file: h5py.File) -> None:
-        file["estimates"] = heard.numpy()
-
-    scene_file.write(path, "hearing", VERSIONS["hear"], made_from, fill)
-
-
-def _read_hearing(path: Path, made_from: str) -> Tensor:
-    with scene_file.open_checked(path, "hearing", VERSIONS["hear"], made_from) as file:
-        return torch.from_numpy(file["estimates"][()])
+    apartments = [build.first_arrival_hash(scene.plan, acoustics) for scene in chosen]
+    return outcome.of(cfg, chosen, apartments, listen)

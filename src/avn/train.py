@@ -3,23 +3,38 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from omegaconf import DictConfig
 
-from avn import listening
+from avn import learned, listening
 from avn.cli import command
+from avn.errors import UserError
 from avn.stages import tell
+
+# What opens or trains each model, and how the figures begin that are printed, over all sounds.
+MODELS: dict[str, tuple[Callable[..., tuple[Any, Path]], tuple[str, ...]]] = {
+    "sound_cnn": (listening.sound_model, ("error_m/", "bearing_deg/")),
+    "stop_classifier": (
+        listening.stop_model,
+        ("auc/validation", "ece/validation", "threshold/", "miss/", "false_"),
+    ),
+}
 
 
 @command("train")
 def main(cfg: DictConfig) -> Path:
     """Train the model, or open it where it is trained, and print what was measured."""
-    _, folder = listening.sound_model(cfg, asked=True)
-    metrics = listening.read_metrics(folder)
+    if cfg.model.name not in MODELS:
+        raise UserError(f"model.name: '{cfg.model.name}' is none of {', '.join(MODELS)}")
+    open_model, begin = MODELS[cfg.model.name]
+    _, folder = open_model(cfg, asked=True)
+    metrics = learned.read_metrics(folder)
     for name in sorted(metrics):
-        if name.startswith(("error_m/", "bearing_deg/")) and "/all" in name:
-            tell(f"{name}: {metrics[name]:.2f}")
+        if name.startswith(begin) and ("/all" in name or name.count("/") == 1):
+            tell(f"{name}: {metrics[name]:.3g}")
     tell(str(folder))
     return folder
 

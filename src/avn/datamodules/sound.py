@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import lightning as L
 import torch
@@ -93,6 +94,8 @@ class ClipSet(Dataset[ClipBatch]):
     purpose : {"train", "eval"}
         Takes of the two purposes have nothing in common.
     seed : int
+    targets : sequence of (K, S, ...) tensors, optional
+        What is to be heard in each apartment; the locations of the sources, if not given.
     """
 
     def __init__(
@@ -103,6 +106,7 @@ class ClipSet(Dataset[ClipBatch]):
         microphone: MicrophoneConfig,
         purpose: str,
         seed: int,
+        targets: Sequence[Tensor] | None = None,
     ) -> None:
         self.scenes = [SceneClips.of(scene, regime) for scene in scenes]
         self.sounds = sounds
@@ -112,7 +116,8 @@ class ClipSet(Dataset[ClipBatch]):
         self.source, self.state = torch.cat(grids).unbind(1)
         sizes = torch.tensor([len(grid) for grid in grids])
         self.apartment = torch.arange(len(grids)).repeat_interleave(sizes)
-        self.target = torch.cat([clips.locations.flatten(0, 1) for clips in self.scenes])
+        wanted = targets or [clips.locations for clips in self.scenes]
+        self.target = torch.cat([target.flatten(0, 1) for target in wanted])
         self.in_sight = torch.cat([clips.in_sight.flatten() for clips in self.scenes])
 
     @property
@@ -226,7 +231,7 @@ class FreshTakes(Sampler[int]):
 
 
 class SoundData(L.LightningDataModule):
-    """What the sound network is trained and validated on; test apartments never enter.
+    """What a listening network is trained and validated on; test apartments never enter.
 
     Parameters
     ----------
@@ -240,11 +245,19 @@ class SoundData(L.LightningDataModule):
     recipe : SoundModelConfig
         Its `batch`, `train_seed`, `sounds_per_pair` and `validation_clips` are used.
 
+    Attributes
+    ----------
+    node, what : str
+        The node of the config that the recipe is, and what it trains, for messages.
+
     Raises
     ------
     UserError
         Where a split is empty or a number cannot work.
     """
+
+    node: ClassVar[str] = "sound_model"
+    what: ClassVar[str] = "sound network"
 
     def __init__(
         self,
@@ -258,30 +271,41 @@ class SoundData(L.LightningDataModule):
         super().__init__()
         if not train or not validation:
             empty = "validation" if train else "train"
-            raise UserError(f"split.{empty} has no apartment; the sound network needs at least one")
+            raise UserError(f"split.{empty} has no apartment; the {self.what} needs at least one")
         if not 1 <= recipe.sounds_per_pair <= len(sounds.names):
             raise UserError(
-                f"sound_model.sounds_per_pair is {recipe.sounds_per_pair}; "
+                f"{self.node}.sounds_per_pair is {recipe.sounds_per_pair}; "
                 f"give 1 to {len(sounds.names)}, the number of sounds"
             )
         if recipe.batch < 1 or recipe.validation_clips < 1:
-            raise UserError("sound_model.batch and sound_model.validation_clips must be 1 or more")
+            raise UserError(f"{self.node}.batch and {self.node}.validation_clips must be 1 or more")
         self.scenes = {"validation": list(validation), "training": list(train)}
         self.sounds, self.recipe = sounds, recipe
-        self.spectrogram: Spectrogram = build_part(recipe.spectrogram, "sound_model")
+        self.spectrogram: Spectrogram = build_part(recipe.spectrogram, self.node)
         # Threads that render; the network learns in others.
         self.threads = 1
         seed = recipe.train_seed
-        self.train_clips = ClipSet(train, regime, sounds, microphone, "train", seed)
+
+        def clips(scenes: Sequence[Scene], purpose: str, seed: int) -> ClipSet:
+            targets = [self.target_of(scene) for scene in scenes]
+            return ClipSet(scenes, regime, sounds, microphone, purpose, seed, targets)
+
+        self.train_clips = clips(train, "train", seed)
         self.measured_clips = {
-            split: ClipSet(scenes, regime, sounds, microphone, "eval", VALIDATION_SEED)
-            for split, scenes in self.scenes.items()
+            split: clips(scenes, "eval", VALIDATION_SEED) for split, scenes in self.scenes.items()
         }
+
+    def target_of(self, scene: Scene) -> Tensor:
+        """What is to be heard of each source in each state of an apartment, (K, S, ...)."""
+        return where_sources_are(scene)[0]
 
     def train_dataloader(self) -> AheadLoader:
         """Every pair once an epoch (`sounds_per_pair` times), each time in a fresh take."""
-        sampler = FreshTakes(self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair)
-        return self._loader(self.train_clips, sampler)
+        return self.loader(self.train_clips, self.train_sampler())
+
+    def train_sampler(self) -> Sampler[int]:
+        """The order of the training clips."""
+        return FreshTakes(self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair)
 
     def val_dataloader(self) -> list[AheadLoader]:
         """Fixed clips of the validation and of the training apartments, in this order."""
@@ -290,9 +314,10 @@ class SoundData(L.LightningDataModule):
             generator = torch.Generator().manual_seed(VALIDATION_SEED)
             items = torch.randperm(len(clips), generator=generator)[: self.recipe.validation_clips]
             # In order, so that the impulse responses are read from one end of the file on.
-            loaders.append(self._loader(clips, items.sort().values.tolist()))
+            loaders.append(self.loader(clips, items.sort().values.tolist()))
         return loaders
 
-    def _loader(self, clips: ClipSet, sampler: Sampler[int] | list[int]) -> AheadLoader:
+    def loader(self, clips: ClipSet, sampler: Sampler[int] | list[int]) -> AheadLoader:
+        """Batches of pictures of some clips, in an order."""
         pictures = PictureSet(clips, self.spectrogram)
         return AheadLoader(pictures, self.threads, batch_size=self.recipe.batch, sampler=sampler)

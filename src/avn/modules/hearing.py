@@ -1,4 +1,4 @@
-"""What a sound network makes of every clip of an apartment, once for all walks through it."""
+"""What a network makes of every clip of an apartment, once for all walks through it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_
 from avn.datamodules.ahead import made_ahead, threads_for_one_operation
 from avn.datamodules.sound import where_sources_are
 from avn.dataset.scene import Scene
-from avn.modules.sound_cnn import SoundCnn
+from avn.modules.listener import Listener
 from avn.modules.sound_metrics import location_errors
 from avn.progress import progress_bar
 
@@ -26,7 +26,7 @@ def hear(
     scene: Scene,
     regime: str,
     sounds: DrySounds,
-    model: SoundCnn,
+    model: Listener,
     takes: int,
     microphone: MicrophoneConfig,
     seed: int = 0,
@@ -41,7 +41,7 @@ def hear(
     regime : str
         Which of its impulse responses.
     sounds : DrySounds
-    model : SoundCnn
+    model : Listener
         Trained; it is set to evaluation.
     takes : int
         Takes 0 to `takes` - 1 of the purpose "eval".
@@ -53,8 +53,8 @@ def hear(
 
     Returns
     -------
-    (K, S, sounds, takes, 2) float32 tensor
-        Metres right and front.
+    (K, S, sounds, takes, ...) float32 tensor
+        The model's answer to each clip; for the sound network 2 metres, right and front.
     """
     brirs = scene.brirs(regime)
     renderer = ClipRenderer(sounds, microphone, seed, "eval")
@@ -62,7 +62,7 @@ def hear(
     source, state = torch.cartesian_prod(torch.arange(sources), torch.arange(states)).unbind(1)
     each = len(sounds.names) * takes
     sound, take = torch.cartesian_prod(torch.arange(len(sounds.names)), torch.arange(takes)).T
-    heard = torch.empty(len(source), each, 2)
+    heard: list[Tensor] = []
     model.eval()
     what = f"listening in {scene.name}"
     bar = progress_bar(what, len(source) * each, "clips") if progress else nullcontext(_silent)
@@ -78,10 +78,10 @@ def hear(
 
     threads, parts = torch.get_num_threads(), torch.arange(len(source)).split(max(1, BATCH // each))
     with bar as advance, threads_for_one_operation(1):
-        for rows, found in zip(parts, made_ahead(listen, parts, threads), strict=True):
-            heard[rows] = found.unflatten(0, (len(rows), each))
+        for found in made_ahead(listen, parts, threads):
+            heard.append(found)
             advance(len(found))
-    return heard.reshape(sources, states, len(sounds.names), takes, 2)
+    return torch.cat(heard).unflatten(0, (sources, states, len(sounds.names), takes))
 
 
 def _silent(count: int) -> None:

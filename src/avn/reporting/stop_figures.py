@@ -1,0 +1,123 @@
+"""What TensorBoard shows of a stop classifier: ROC curve, calibration, where it would stop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import lightning as L
+import numpy as np
+import torch
+from lightning.pytorch.callbacks import Callback
+from lightning.pytorch.loggers import TensorBoardLogger
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from avn.apartments.floor_plan import CELL, FloorPlan
+from avn.reporting.sound_figures import draw_plan
+
+
+def reliability(axes: Axes, probability: NDArray[Any], label: NDArray[Any], bins: int = 15) -> None:
+    """Draw how often something was so against how likely it was said to be."""
+    which = np.minimum((probability * bins).astype(int), bins - 1)
+    counts = np.bincount(which, minlength=bins)
+    filled = counts > 0
+    said = np.bincount(which, probability, bins)[filled] / counts[filled]
+    found = np.bincount(which, label, bins)[filled] / counts[filled]
+    axes.plot((0, 1), (0, 1), color="0.7")
+    axes.plot(said, found, "o-")
+    axes.set_xlabel("said")
+    axes.set_ylabel("found")
+    axes.set_aspect("equal")
+    axes.set_title("calibration")
+
+
+def roc(axes: Axes, probability: NDArray[Any], label: NDArray[Any]) -> None:
+    """Draw the ROC curve."""
+    order = np.argsort(-probability, kind="stable")
+    hits, alarms = np.cumsum(label[order]), np.cumsum(1 - label[order])
+    axes.plot(alarms / max(1, alarms[-1]), hits / max(1, hits[-1]))
+    axes.set_xlabel("false alarms")
+    axes.set_ylabel("hits")
+    axes.set_aspect("equal")
+    axes.set_title("ROC")
+
+
+def curves_figure(probability: NDArray[Any], label: NDArray[Any], title: str) -> Figure:
+    """Draw ROC curve and calibration of N probabilities (N,) with their labels (N,), 0 or 1."""
+    figure = Figure(figsize=(8, 4), layout="constrained")
+    roc(figure.add_subplot(1, 2, 1), probability, label)
+    reliability(figure.add_subplot(1, 2, 2), probability, label)
+    figure.suptitle(title)
+    return figure
+
+
+def stop_map(
+    plan: FloorPlan,
+    lattice: NDArray[Any],
+    probability: NDArray[Any],
+    goal: NDArray[Any],
+    title: str,
+) -> Figure:
+    """Draw how likely the classifier calls each cell the goal, the mean over headings.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+    lattice : (C, 2) integer array
+    probability : (4 C) array
+    goal : (C) bool array
+        The cells that are.
+    title : str
+    """
+    figure = Figure(figsize=(7, 6), layout="constrained")
+    axes = figure.add_subplot()
+    draw_plan(axes, plan)
+    east, north = (lattice * CELL).T
+    mean = probability.reshape(-1, 4).mean(axis=1)
+    drawn = axes.scatter(east, north, c=mean, vmin=0, vmax=1, s=40, cmap="viridis", zorder=3)
+    look: dict[str, Any] = {"facecolors": "none", "edgecolors": "red", "zorder": 4}
+    axes.scatter(east[goal], north[goal], s=110, label="goal", **look)
+    figure.colorbar(drawn, ax=axes, label="probability")
+    axes.set_title(title)
+    axes.legend(loc="upper left", bbox_to_anchor=(0, -0.1), frameon=False)
+    return figure
+
+
+class StopFigures(Callback):
+    """Writes figures of the first validation apartment's first source to TensorBoard.
+
+    Parameters
+    ----------
+    every : int
+        Epochs between two figures; the last epoch has them too.
+    """
+
+    def __init__(self, every: int = 5) -> None:
+        self.every = every
+
+    def on_validation_epoch_end(self, trainer: L.Trainer, pl_module: Any) -> None:
+        """Write a map for each sound, and the curves over all of them."""
+        epoch = trainer.current_epoch + 1
+        due = epoch % self.every == 0 or epoch in (1, trainer.max_epochs)
+        if not due or not isinstance(trainer.logger, TensorBoardLogger):
+            return
+        data: Any = trainer.datamodule  # type: ignore[attr-defined]
+        clips, scene = data.measured_clips["validation"], data.scenes["validation"][0]
+        # The states of source 0 in the first apartment come first.
+        states = torch.arange(4 * len(scene.grid.lattice))
+        at_goal = clips.target[states].eq(0).numpy()
+        writer = trainer.logger.experiment
+        found = []
+        for index, sound in enumerate(clips.sounds.names):
+            items = clips.item(states, torch.tensor(index), 0)
+            batches = [clips.__getitems__(part.tolist())["clips"] for part in items.split(128)]
+            with torch.inference_mode():
+                said = torch.cat([pl_module(batch.to(pl_module.device)).cpu() for batch in batches])
+            found.append(said.numpy())
+            title = f"{scene.name}, {sound}, epoch {epoch}"
+            figure = stop_map(scene.plan, scene.grid.lattice, found[-1], at_goal[::4], title)
+            writer.add_figure(f"stops/{sound}", figure, trainer.global_step)
+        label = np.tile(at_goal, len(found)).astype(float)
+        curves = curves_figure(np.concatenate(found), label, f"{scene.name}, epoch {epoch}")
+        writer.add_figure("curves", curves, trainer.global_step)
