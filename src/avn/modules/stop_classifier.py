@@ -27,8 +27,8 @@ class StopModelConfig(SoundModelConfig):
 
     _target_: str = "avn.modules.stop_classifier.StopClassifier"
     net: NetConfig = field(default_factory=lambda: NetConfig(reach=1.0))
-    epochs: int = 10
-    validation_clips: int = 3000
+    epochs: int = 7
+    validation_clips: int = 2000
     positives: float = 0.25
     criterion: str = "approach"
     threshold: float | None = None
@@ -68,14 +68,14 @@ train_seed, sounds_per_pair, validation_clips
         net: dict[str, Any],
         optimizer: dict[str, Any],
         schedule: str = "cosine",
-        epochs: int = 10,
+        epochs: int = 7,
         patience: int = 6,
         batch: int = 64,
         mirror: bool = True,
         symmetric: bool = True,
         train_seed: int = 0,
         sounds_per_pair: int = 1,
-        validation_clips: int = 3000,
+        validation_clips: int = 2000,
         positives: float = 0.25,
         criterion: str = "approach",
         threshold: float | None = None,
