@@ -15,16 +15,18 @@ from avn.apartments.floor_plan import (
     FloorPlan,
 )
 from avn.apartments.surfaces import BUILDING, DOOR_FRAME, PANE, Rect, _subtract_all, build_surfaces
+from avn.views.decor import BORDER, DEPTH, Hanging, hangings
 from avn.views.drawing import draw, to_linear
 from avn.views.lights import LAMP_RADIUS, Light
 from avn.views.mesh import Mesh, boxes, join
+from avn.views.pools import COLOURS
 from avn.views.textures import Pattern, outdoors, pattern
 
 SKIRTING = 0.08
 CASING = 0.07
 FRAME = 0.05
 # How bright a pane and a lamp look: less than they shine, as to an eye that is used to them.
-_PANE_LOOKS = 1.1
+_PANE_LOOKS = 2.2
 _LAMP_LOOKS = 3.0
 _NEAR = 1e-6
 
@@ -121,7 +123,8 @@ def building(
     shell = np.flatnonzero(surfaces.piece == BUILDING)
     for q in shell:
         axis, offset = int(surfaces.axis[q]), float(surfaces.offset[q])
-        rect = (*map(float, surfaces.lower[q]), *map(float, surfaces.upper[q]))
+        a0, b0, a1, b1 = (float(x) for x in (*surfaces.lower[q], *surfaces.upper[q]))
+        rect = (a0, b0, a1, b1)
         material = surfaces.materials[surfaces.material[q]]
         room, normal = _side(plan, axis, offset, rect)
         if material == PANE and axis != 2:
@@ -141,6 +144,8 @@ def building(
                 rects = _subtract_all(rects, strips)
             for own in rects:
                 builder.rectangle(axis, offset, own, normal, texture)
+    for number, hanging in enumerate(hangings(plan, part, look)):
+        _hang(builder, hanging, number)
     mesh, glow = builder.mesh()
     shade = np.ones(len(mesh), dtype=bool)
     if not plan.lamps:
@@ -155,8 +160,6 @@ def building(
 
 def _trim_colour(plan: FloorPlan, part: str, look: int) -> NDArray[np.float64]:
     """Linear colour of skirting, door frames and windows: mostly white."""
-    from avn.views.pools import COLOURS
-
     rng = draw("trim", part, plan.name, look)
     pool = COLOURS[part]["wood"]
     chosen = pool[0] if rng.random() < 0.6 else pool[int(rng.random() * len(pool))]
@@ -253,6 +256,25 @@ def _window(
             _PANE_LOOKS * light.sky,
             whole=rect,
         )
+
+
+def _hang(builder: _Builder, hanging: Hanging, number: int) -> None:
+    """A picture in its frame, which stands out from the wall a little."""
+    texture = builder.picture(hanging.picture, "hanging", number)
+    frame = to_linear(hanging.frame)
+    axis, normal = hanging.axis, hanging.normal
+    front = hanging.offset + normal * DEPTH
+    low, sill, high, top = hanging.rect
+    inner = (low + BORDER, sill + BORDER, high - BORDER, top - BORDER)
+    builder.rectangle(axis, front, inner, normal, texture, whole=inner)
+    for own in _subtract_all([hanging.rect], [inner]):
+        builder.rectangle(axis, front, own, normal, colour=frame)
+    deep = (min(hanging.offset, front), max(hanging.offset, front))
+    for offset, sign in ((low, -1.0), (high, 1.0)):
+        builder.rectangle(1 - axis, offset, (deep[0], sill, deep[1], top), sign, colour=frame)
+    for offset, sign in ((sill, -1.0), (top, 1.0)):
+        flat = (deep[0], low, deep[1], high) if axis == 0 else (low, deep[0], high, deep[1])
+        builder.rectangle(2, offset, flat, sign, colour=frame)
 
 
 def _fixtures(plan: FloorPlan, light: Light) -> tuple[Mesh, NDArray[np.float32]]:

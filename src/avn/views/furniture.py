@@ -7,8 +7,11 @@ from avn.views.drawing import draw
 from avn.views.mesh import Mesh, boxes
 
 try:
+    from avn.views.furniture_models import catalogue
+
+    catalogue()
     from avn.views.models import assets_hash, furniture_mesh
-except ImportError:
+except (ImportError, OSError):
 
     def assets_hash() -> str:
         return "boxes"

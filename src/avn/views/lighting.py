@@ -159,7 +159,7 @@ def bake(
     seen = _gather(triangles, solid, normal, points, cfg.gather_rays)
     passed = np.zeros_like(direct)
     for _ in range(cfg.bounces):
-        passed = _bounce(seen, direct + passed, albedo, points.front)
+        passed = _bounce(seen, direct + passed, albedo, points.front, points.back)
     weights = np.maximum(area, 1e-8)
     baked = []
     for side in (points.front, points.back):
@@ -366,18 +366,21 @@ def _bounce(
     light: NDArray[np.float32],
     albedo: NDArray[np.float32],
     front: NDArray[np.int32],
+    back: NDArray[np.int32],
 ) -> NDArray[np.float32]:
     """Irradiance (P, 3) at points from what lies before them, lit with `light`."""
-    # the backs' points are not asked for: what is met from behind is inside a thing, and dark
     out = np.zeros_like(light)
     for p in range(len(seen)):
         for ray in range(seen.shape[1]):
             face = seen[p, ray]
-            if face < 0 or face % 2 == 1:
+            if face < 0:
                 continue
             triangle = face // 2
+            point = front[triangle] if face % 2 == 0 else back[triangle]
+            if point < 0:
+                continue
             for i in range(3):
-                out[p, i] += albedo[triangle, i] * light[front[triangle], i]
+                out[p, i] += albedo[triangle, i] * light[point, i]
         for i in range(3):
             out[p, i] /= seen.shape[1]
     return out

@@ -20,7 +20,7 @@ from avn.views.scenery import scenery
 # Levels of a picture that are skipped where only its colour near a triangle counts.
 _COARSE = 4
 # Brightness that what is seen is exposed to, on average over the eye's scale.
-_KEY = 0.30
+_KEY = 0.55
 
 
 @dataclass

@@ -184,8 +184,13 @@ def shade(
 
 @numba.njit(cache=True)
 def _film(x: float) -> float:
-    """K. Narkowicz's fit of the ACES tone curve (2015): linear light to displayed light."""
-    return min(max(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0), 1.0)
+    """Linear light to displayed light.
+
+    The curve of E. Reinhard et al., "Photographic tone reproduction for digital images",
+    SIGGRAPH 2002, equation 4, whose white is at 4, after a little contrast.
+    """
+    x = max(x, 0.0) ** 1.2
+    return min(x * (1.0 + x / 16.0) / (1.0 + x), 1.0)
 
 
 _STEPS = (to_srgb(np.arange(4097) / 4096) * 255 + 0.5).astype(np.uint8)
