@@ -1,0 +1,307 @@
+"""Take furniture models out of Debian's package sweethome3d-furniture.
+
+    apt-get download sweethome3d-furniture
+    dpkg -x sweethome3d-furniture_*.deb unpacked
+    python scripts/extract_furniture.py unpacked [name ...]
+
+Which models, for which kinds of piece and which pool, is in `furniture_list.py`. They are turned
+into the frame of a piece, cut down where they have more triangles than a small picture can show,
+and stored as `avn.views.furniture_models` says. The same package gives the same bytes. With
+names only those models are made again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import re
+import sys
+import tempfile
+import zipfile
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from furniture_credits import AUTHORS, LIBRARIES, credits_of, licences
+from furniture_list import ENTRIES, Entry, Slab, Source
+from numpy.typing import NDArray
+from PIL import Image
+
+from avn.views.furniture_models import FOLDER, STEPS
+from avn.views.obj_files import GLASS, read_obj
+
+# Longest side of a picture, and how well JPEG keeps it.
+PICTURE, QUALITY = 256, 85
+# Albedos stay in the range of real surfaces.
+DARKEST, BRIGHTEST = 0.015, 0.85
+
+
+@dataclass
+class Shape:
+    """Triangles while they are worked on; `look` indexes (colour, picture path) pairs."""
+
+    vertices: NDArray[np.float64]
+    uv: NDArray[np.float64]
+    look: NDArray[np.int64]
+    looks: list[tuple[tuple[float, float, float], Path | None]]
+
+
+@dataclass
+class Origin:
+    """What the library says of a model."""
+
+    title: str
+    author: str
+    licence: str
+    source: str
+    size: tuple[float, float, float]
+    path: Path
+    rotation: NDArray[np.float64] | None
+
+
+class Libraries:
+    """The libraries of the package, unpacked to a folder."""
+
+    def __init__(self, package: Path, folder: Path) -> None:
+        self._origins: dict[str, Origin] = {}
+        for short, (name, licence) in LIBRARIES.items():
+            found = sorted(package.rglob(f"{name}.sh3f"))
+            if not found:
+                raise SystemExit(f"{name}.sh3f is not under {package}")
+            with zipfile.ZipFile(found[0]) as archive:
+                archive.extractall(folder / name)
+            self._read(short, folder / name, name, licence)
+
+    def _read(self, short: str, folder: Path, library: str, licence: str) -> None:
+        text = (folder / "PluginFurnitureCatalog.properties").read_text(encoding="latin-1")
+        rows: dict[str, dict[str, str]] = defaultdict(dict)
+        for key, number, value in re.findall(r"^(\w+)#(\d+)\s*=\s*(.*?)\s*$", text, re.M):
+            rows[number][key] = value
+        for row in rows.values():
+            path = folder / row["model"].lstrip("/")
+            size = [float(row[key]) / 100 for key in ("width", "depth", "height")]
+            turned = row.get("modelRotation")
+            rotation = np.array(turned.split(), float).reshape(3, 3) if turned else None
+            self._origins[f"{short}/{path.stem}"] = Origin(
+                row["name"],
+                AUTHORS.get(row["creator"], f"{row['creator']} (blendswap.com)"),
+                licence,
+                f"{library}/{path.stem}",
+                (size[0], size[1], size[2]),
+                path,
+                rotation,
+            )
+
+    def origin(self, name: str) -> Origin:
+        """What the library says of `library/model`."""
+        return self._origins[name]
+
+    def shape(self, name: str) -> Shape:
+        """The model in the frame of a piece, u and v and w each from 0 to 1."""
+        origin = self.origin(name)
+        model = read_obj(origin.path)
+        at = model.vertices
+        if origin.rotation is not None:
+            at = at @ origin.rotation.T
+        # The files have y up and their front at z; u is to the right of who looks that way.
+        at = np.stack((-at[..., 0], at[..., 2], at[..., 1]), axis=-1)
+        looks = [
+            (GLASS if m.clear else m.colour, None if m.clear else m.image) for m in model.materials
+        ]
+        return Shape(unit(at), model.uv, model.material.astype(np.int64), looks)
+
+
+def unit(at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Scaled so that each coordinate runs from 0 to 1."""
+    low = at.min(axis=(0, 1))
+    return (at - low) / np.maximum(at.max(axis=(0, 1)) - low, 1e-9)
+
+
+def put_together(entry: Entry, libraries: Libraries) -> Shape:
+    """The parts of an entry as one shape."""
+    vertices, uv, look = [], [], []
+    looks: list[tuple[tuple[float, float, float], Path | None]] = []
+    for part in entry.parts:
+        shape = box(part) if isinstance(part, Slab) else bent(part, libraries.shape(part.name))
+        low, high = np.array(part.at[:3]), np.array(part.at[3:])
+        vertices.append(low + shape.vertices * (high - low))
+        uv.append(shape.uv)
+        look.append(shape.look + len(looks))
+        for colour, picture in shape.looks:
+            tint = entry.tint if isinstance(part, Source) else (1.0, 1.0, 1.0)
+            red, green, blue = (
+                float(min(max(c * t, DARKEST), BRIGHTEST))
+                for c, t in zip(colour, tint, strict=True)
+            )
+            looks.append(((0.9, 0.9, 0.9) if picture else (red, green, blue), picture))
+    return Shape(unit(np.concatenate(vertices)), np.concatenate(uv), np.concatenate(look), looks)
+
+
+def box(slab: Slab) -> Shape:
+    """The twelve triangles of a plain box."""
+    faces = []
+    for axis in range(3):
+        for end in (0.0, 1.0):
+            quad = np.zeros((4, 3))
+            quad[:, axis] = end
+            quad[:, (axis + 1) % 3], quad[:, (axis + 2) % 3] = (0, 1, 1, 0), (0, 0, 1, 1)
+            faces += [quad[[0, 1, 2]], quad[[0, 2, 3]]]
+    corners = np.stack(faces)
+    return Shape(corners, np.zeros((12, 3, 2)), np.zeros(12, np.int64), [(slab.colour, None)])
+
+
+def bent(part: Source, shape: Shape) -> Shape:
+    """The shape turned by quarters and with its extents mapped as `part.bend` says."""
+    at = shape.vertices.copy()
+    for _ in range(part.turn):
+        at = np.stack((1 - at[..., 1], at[..., 0], at[..., 2]), axis=-1)
+    for axis, knots in part.bend.items():
+        given, wanted = np.array(knots, dtype=float).T
+        column = "uvw".index(axis)
+        at[..., column] = np.interp(at[..., column], given, wanted)
+    return Shape(unit(at), shape.uv, shape.look, shape.looks)
+
+
+def cut_down(shape: Shape, size: tuple[float, float, float], most: int) -> Shape:
+    """Merge corners that lie in the same small cube until few enough triangles are left.
+
+    Vertex clustering (Rossignac and Borrel, "Multi-resolution 3D approximations for rendering
+    complex scenes", 1993), each cluster at the mean of its corners.
+    """
+    metres = shape.vertices * np.array(size)
+    edge = 0.002
+    kept, at = with_area(metres), metres
+    while kept.sum() > most:
+        cube = np.floor(metres.reshape(-1, 3) / edge).astype(np.int64)
+        _, member, count = np.unique(cube, axis=0, return_inverse=True, return_counts=True)
+        member = member.reshape(-1)
+        mean = np.stack(
+            [np.bincount(member, metres.reshape(-1, 3)[:, i]) / count for i in range(3)], axis=-1
+        )
+        at = mean[member].reshape(metres.shape)
+        kept = with_area(at)
+        edge *= 1.2
+    return Shape(unit(at[kept]), shape.uv[kept], shape.look[kept], shape.looks)
+
+
+def with_area(at: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which triangles (metres) have an area that a picture could show."""
+    normal = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
+    area: NDArray[np.bool_] = np.linalg.norm(normal, axis=-1) > 1e-9
+    return area
+
+
+@cache
+def picture(path: Path) -> bytes:
+    """A picture of a library, small, as the bytes of a JPEG file."""
+    with Image.open(path) as image:
+        rgba = image.convert("RGBA")
+    # What is cut out of a leaf's picture takes the colour of what is left.
+    pixels = np.array(rgba, dtype=np.float64)
+    solid = pixels[..., 3] > 127
+    if solid.any():
+        pixels[~solid, :3] = pixels[solid, :3].mean(axis=0)
+    rgb = Image.fromarray(pixels[..., :3].astype(np.uint8))
+    rgb.thumbnail((PICTURE, PICTURE), Image.Resampling.LANCZOS)
+    stream = io.BytesIO()
+    rgb.save(stream, "JPEG", quality=QUALITY)
+    return stream.getvalue()
+
+
+def store(name: str, shape: Shape) -> set[str]:
+    """Write a model's file; gives the hashes of its pictures."""
+    used, look = np.unique(shape.look, return_inverse=True)
+    looks = [shape.looks[i] for i in used]
+    paths = sorted({path for _, path in looks if path is not None})
+    texture = [paths.index(path) if path is not None else -1 for _, path in looks]
+    quantised = np.round(shape.vertices * STEPS).astype(np.uint16).reshape(-1, 3)
+    textured = np.array(texture)[look.reshape(-1)] >= 0
+    uv = np.where(textured[:, None, None], shape.uv, 0.0).astype(np.float32).reshape(-1, 2)
+    corners = np.concatenate([quantised.astype(np.float64), uv.astype(np.float64)], axis=1)
+    unique, faces = np.unique(corners, axis=0, return_inverse=True)
+    if len(unique) > STEPS:
+        raise SystemExit(f"{name}: {len(unique)} corners are more than 16 bits can number")
+    arrays = {
+        "points": unique[:, :3].astype(np.uint16),
+        "faces": faces.reshape(-1, 3).astype(np.uint16),
+        "material": look.reshape(-1).astype(np.uint8),
+        "colour": np.array([colour for colour, _ in looks], dtype=np.float32),
+        "texture": np.array(texture, dtype=np.int8),
+    }
+    if paths:
+        arrays["uv"] = unique[:, 3:].astype(np.float32)
+    for i, path in enumerate(paths):
+        arrays[f"picture_{i}"] = np.frombuffer(picture(path), dtype=np.uint8)
+    np.savez_compressed(FOLDER / f"{name}.npz", **arrays)
+    return {hashlib.sha256(picture(path)).hexdigest() for path in paths}
+
+
+def true_size(entry: Entry, libraries: Libraries) -> tuple[float, float, float]:
+    """Width, depth and height in metres: what the library says of what is kept of the model."""
+    if entry.size:
+        return entry.size
+    source = next(part for part in entry.parts if isinstance(part, Source))
+    size = list(libraries.origin(source.name).size)
+    for axis, knots in source.bend.items():
+        size["uvw".index(axis)] *= knots[-1][0] - knots[0][0]
+    return round(size[0], 4), round(size[1], 4), round(size[2], 4)
+
+
+def row_of(entry: Entry, name: str, libraries: Libraries) -> dict[str, Any]:
+    """The entry's row of the catalogue."""
+    origins = [libraries.origin(p.name) for p in entry.parts if isinstance(p, Source)]
+    return {
+        "name": name,
+        "kinds": entry.kinds.split(),
+        "pool": entry.pool,
+        "size": true_size(entry, libraries),
+        "row": entry.row,
+        "title": ", ".join(o.title for o in origins) or name.replace("_", " ").capitalize(),
+        "author": ", ".join(dict.fromkeys(o.author for o in origins)) or "the authors of avn",
+        "licence": " and ".join(dict.fromkeys(o.licence for o in origins)) or "Apache-2.0",
+        "source": ", ".join(o.source for o in origins) or "made of boxes",
+    }
+
+
+def name_of(entry: Entry) -> str:
+    """What an entry is called: its own name, or that of its only source."""
+    source = next((part.name for part in entry.parts if isinstance(part, Source)), "")
+    return entry.name or re.sub(r"\W", "_", source).lower()
+
+
+def main() -> None:
+    """Write the models, the catalogue, the credits and the licences."""
+    if len(sys.argv) < 2:
+        raise SystemExit(__doc__)
+    package, only = Path(sys.argv[1]), set(sys.argv[2:])
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    entries = {name_of(entry): entry for entry in ENTRIES}
+    for old in FOLDER.glob("*.npz"):
+        if not only or old.stem not in entries:
+            old.unlink()
+    pools: dict[str, str] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        libraries = Libraries(package, Path(folder))
+        for name, entry in entries.items():
+            if only and name not in only:
+                continue
+            size = true_size(entry, libraries)
+            shape = cut_down(put_together(entry, libraries), size, entry.triangles)
+            for digest in store(name, shape):
+                if pools.setdefault(digest, entry.pool) != entry.pool:
+                    raise SystemExit(f"{name}: has a picture of the pool {pools[digest]}")
+            print(f"{name}: {len(shape.vertices)} triangles", flush=True)
+        rows = [row_of(entry, name, libraries) for name, entry in sorted(entries.items())]
+    text = json.dumps(rows, indent=1, ensure_ascii=False) + "\n"
+    (FOLDER / "catalogue.json").write_text(text, encoding="utf-8")
+    (FOLDER / "README.md").write_text(credits_of(rows), encoding="utf-8")
+    for licence, lines in licences(package).items():
+        (FOLDER / f"LICENSE.{licence}.txt").write_text(lines, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
