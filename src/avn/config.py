@@ -6,7 +6,7 @@ key or a wrong type is refused with its name.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
@@ -16,10 +16,13 @@ from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.clips import MicrophoneConfig
 from avn.agents.base import BaselineConfig
 from avn.agents.greedy import GreedyConfig
+from avn.agents.planner_agent import PlannerConfig
 from avn.apartments.splits import SplitConfig
 from avn.modules.sound_cnn import SoundModelConfig
 from avn.modules.stop_classifier import StopModelConfig
 from avn.navigation.protocols import ProtocolConfig
+from avn.views.raycast import RaycastConfig
+from avn.views.renderer import RendererConfig
 
 
 @dataclass
@@ -31,10 +34,14 @@ class ModelConfig:
 
 @dataclass
 class AgentConfig:
-    """A row of the table; a privileged one is shown the truth and is a bound, not an entry."""
+    """A row of the table; a privileged one is shown the truth and is a bound, not an entry.
+
+    `truth` names the parts in whose place it is given the truth: location, window, map, pose.
+    """
 
     name: str = MISSING
     privileged: bool = False
+    truth: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -48,7 +55,12 @@ class CoreConfig:
     sound_model: SoundModelConfig = MISSING
     stop_model: StopModelConfig = MISSING
     protocol: ProtocolConfig = MISSING
+    renderer: RendererConfig = MISSING
+    planner: PlannerConfig = MISSING
     baseline: BaselineConfig = MISSING
+    look: str = MISSING
+    exploration: str = MISSING
+    localisation: str = MISSING
     takes: int = MISSING
     train_seed: int = MISSING
     outputs: str = MISSING
@@ -79,6 +91,7 @@ class EvalConfig(CoreConfig):
     agent: AgentConfig = MISSING
     seed: int = MISSING
     episodes: str = MISSING
+    part: str = MISSING
 
 
 @dataclass
@@ -106,6 +119,9 @@ SCHEMAS = {
     ("sound_model", "schema"): SoundModelConfig(train_seed=_SEED),
     ("stop_model", "schema"): StopModelConfig(train_seed=_SEED),
     ("protocol", "schema"): ProtocolConfig,
+    ("renderer", "schema"): RendererConfig,
+    ("renderer", "raycast_schema"): RaycastConfig,
+    ("planner", "schema"): PlannerConfig(look=II("look")),
     ("baseline", "schema"): BaselineConfig,
     ("baseline", "greedy_schema"): GreedyConfig,
 }

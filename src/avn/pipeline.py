@@ -15,6 +15,7 @@ from avn.acoustics.brir import AcousticsConfig, check_config
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.splits import SplitConfig, load_split
 from avn.dataset import build, scene
+from avn.dataset.build_views import build_views, views_hash, views_made
 from avn.dataset.scene import Scene
 from avn.errors import UserError
 from avn.stages import check_name, digest, make_once, stage_folder
@@ -105,4 +106,32 @@ def scenes(
             auto=auto,
             estimate=f"about {max(1, round(pairs * 0.02 / cfg.processes))} s",
         )
+    return opened
+
+
+def views_hashes(cfg: DictConfig, parts: Sequence[str]) -> dict[str, list[str]]:
+    """Hash of the views of each apartment of some parts of the split."""
+    renderer = typed(cfg.renderer)
+    return {part: [views_hash(plan, part, renderer) for plan in plans(cfg)[part]] for part in parts}
+
+
+def seen_scenes(
+    cfg: DictConfig, parts: Sequence[str] = PARTS, asked: bool = False
+) -> dict[str, list[Scene]]:
+    """The scenes of some parts of the split with their views, made where they are missing.
+
+    Parameters and errors are those of `scenes`.
+    """
+    check_name("renderer.name", cfg.renderer.name)
+    opened, renderer = scenes(cfg, parts, asked=asked), typed(cfg.renderer)
+    every = [(which, part) for part, found in opened.items() for which in found]
+    count = sum(4 * which.grid.cells for which, _ in every)
+    make_once(
+        scenes_folder(cfg),
+        f"views of the {', '.join(parts)} apartments of '{cfg.split.name}' ({renderer.name})",
+        done=lambda: views_made(every, renderer),
+        make=lambda: build_views(every, renderer, cfg.processes),
+        auto=cfg.auto or asked,
+        estimate=f"about {max(1, round((count * 0.06 + 60 * len(every)) / cfg.processes))} s",
+    )
     return opened

@@ -31,11 +31,14 @@ class Agent(ABC):
     privileged : bool
         Whether the agent is shown the simulator before it acts; such rows are bounds and no
         entries of the table.
+    explores : bool
+        Whether it is shown the exploration walk of its episode.
     needs : tuple of str
-        Observations without which it cannot act.
+        Observations without which it cannot act; see `wants`.
     """
 
     privileged: ClassVar[bool] = False
+    explores: bool = False
     needs: ClassVar[tuple[str, ...]] = ()
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
@@ -52,6 +55,21 @@ class Agent(ABC):
         self.n = n
         self.generator = generator
         self.protocol = protocol
+
+    def wants(self, protocol: Protocol) -> tuple[str, ...]:
+        """Observations that it cannot do without under a protocol."""
+        return self.needs
+
+    def explore(self, walks: TensorDict, walk: Tensor) -> None:
+        """Be shown exploration walks, after `reset` and before the first action.
+
+        Parameters
+        ----------
+        walks : TensorDict of batch size (W, T)
+            What is observed at each step of each walk; odometry counts from its own start.
+        walk : (N,) int64 tensor
+            Which walk belongs to each episode.
+        """
 
     @abstractmethod
     def act(self, observation: TensorDict) -> Tensor:

@@ -95,6 +95,11 @@ class Protocol:
         """How many actions there are: 5 with Stop, 4 without; they are numbered from 0."""
         return STOP + 1 if self.says_stop else STOP
 
+    @property
+    def counts_turns(self) -> bool:
+        """Whether turning is paid for: where only the number of all actions ends an episode."""
+        return self.moves_factor is None
+
     def goal_cells(self, grid: Grid, sources: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Where an agent succeeds, (K, C)."""
         if self.goal == "radius":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,12 @@ from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 
 # What to do where an agent wants an observation that nobody makes.
-_MAKERS = {"sound": "choose a sound model, such as sound_model=cnn5"}
+_MAKERS = {
+    "sound": "choose a sound model, such as sound_model=cnn5",
+    "reach": "choose what tells when to stop, such as stop_model=cnn5",
+    "window": "choose what sees free squares, such as mapper=occupancy",
+    "feature": "choose what knows places again, such as mapper=spatial_memory",
+}
 
 
 @dataclass(frozen=True)
@@ -40,7 +46,8 @@ def walk_room(
     episodes: Episodes,
     protocol: Protocol,
     labels: Labels,
-    hearing: Tensor | None = None,
+    hearing: Mapping[str, Tensor] | None = None,
+    sights: Mapping[str, Tensor] | None = None,
 ) -> pd.DataFrame:
     """Let an agent walk all episodes of a room at once.
 
@@ -49,7 +56,7 @@ def walk_room(
 
     Parameters
     ----------
-    hearing : (K, S, sounds, takes, D) tensor, optional
+    hearing, sights : mappings of str to tensor, optional
         See `Simulator`.
 
     Returns
@@ -62,7 +69,7 @@ def walk_room(
     UserError
         Where the agent needs an observation that is not there.
     """
-    simulator = Simulator(place, episodes, protocol, hearing)
+    simulator = Simulator(place, episodes, protocol, hearing, sights)
     walk(agent, simulator)
     return records(simulator, labels)
 
@@ -74,7 +81,7 @@ def walk(agent: Agent, simulator: Simulator) -> None:
     simulator.
     """
     observation = simulator.reset()
-    for key in sorted(set(agent.needs) - set(observation.keys())):
+    for key in sorted(set(agent.wants(simulator.protocol)) - set(observation.keys())):
         maker = _MAKERS.get(key, "choose another agent")
         raise UserError(f"agent {type(agent).__name__} needs the observation '{key}': {maker}")
     episodes = simulator.episodes
@@ -82,6 +89,13 @@ def walk(agent: Agent, simulator: Simulator) -> None:
     agent.reset(len(simulator), generator, simulator.protocol)
     if agent.privileged:
         agent.reveal(simulator)
+    if agent.explores:
+        if not len(episodes.walks):
+            raise UserError(
+                f"episodes: agent {type(agent).__name__} explores first, and these episodes have "
+                "no exploration walk; take episodes=frozen and protocol.exploration=400"
+            )
+        agent.explore(*simulator.explored())
     with torch.inference_mode():
         while not bool(simulator.done.all()):
             observation = simulator.step(agent.act(observation))

@@ -33,10 +33,10 @@ class Simulator:
         The apartment: grid, source cells, lines of sight.
     episodes : Episodes
     protocol : Protocol
-    hearing : (K, S, sounds, takes, D) tensor, optional
-        What is heard of each source in each state. Which take an episode hears at a step is drawn
-        from the seed, the episode and the step, whoever walks. Without it observations have no
-        `sound`.
+    hearing : mapping of str to (K, S, sounds, takes, ...) tensor, optional
+        What is heard of each source in each state, by the name of the observation: `sound` (..., 2)
+        where the source is heard, `reach` (...) how surely it is within reach. Which take an
+        episode hears at a step is drawn from the seed, the episode and the step, whoever walks.
     sights : mapping of str to (S, ...) tensor, optional
         What is seen in each state, by the name of the observation: `view`, `depth`, `feature`,
         `window`.
@@ -62,7 +62,7 @@ class Simulator:
         place: Place,
         episodes: Episodes,
         protocol: Protocol,
-        hearing: Tensor | None = None,
+        hearing: Mapping[str, Tensor] | None = None,
         sights: Mapping[str, Tensor] | None = None,
     ) -> None:
         self.place = place
@@ -149,17 +149,42 @@ class Simulator:
         Returns
         -------
         TensorDict of batch size N
-            `collided` (N,) bool, whether the last action was a blocked move; `odometry` (N, 3)
-            int64, cells to the right and to the front and quarter turns clockwise since the start,
-            in the frame of the start; with hearing also `sound` (N, D), and with sights what is
-            seen, by name.
+            `running` (N,) bool, whether the episode goes on; `collided` (N,) bool, whether the
+            last action was a blocked move; `odometry` (N, 3) int64, cells to the right and to the
+            front and quarter turns clockwise since the start, in the frame of the start; with
+            hearing what is heard, and with sights what is seen, by name.
         """
         odometry = self._seen_from[self._frame + self.state] - self._origin
-        observation = {"collided": self._collided.clone(), "odometry": odometry}
-        if self._hearing is not None:
-            observation["sound"] = self._hearing[self._clip()]
+        observation = {
+            "running": ~self.done,
+            "collided": self._collided.clone(),
+            "odometry": odometry,
+        }
+        if self._hearing:
+            clip = self._clip()
+            observation |= {name: heard[clip] for name, heard in self._hearing.items()}
         observation |= {name: seen[self.state] for name, seen in self._sights.items()}
         return TensorDict(observation, batch_size=[len(self)])
+
+    def explored(self) -> tuple[TensorDict, Tensor]:
+        """What is observed on the exploration walks, in silence.
+
+        Returns
+        -------
+        walks : TensorDict of batch size (W, T)
+            `collided`, `odometry` since the start of the walk, and what is seen, as in `observe`.
+        walk : (N,) int64
+            The walk of each episode.
+        """
+        walks = torch.from_numpy(self.episodes.walks)
+        first = walks[:, :1]
+        frame = first % HEADINGS * len(self.transitions)
+        observed = {
+            "collided": torch.zeros(walks.shape, dtype=torch.bool),
+            "odometry": self._seen_from[frame + walks] - self._seen_from[frame + first],
+        }
+        observed |= {name: seen[walks] for name, seen in self._sights.items()}
+        return TensorDict(observed, batch_size=walks.shape), torch.from_numpy(self.episodes.walk)
 
     def _end(self, running: Tensor, actions: Tensor) -> None:
         """Note which episodes end with this action, and how."""
@@ -183,20 +208,24 @@ class Simulator:
         moves = self.distances.source_moves[self.episodes.source, self.episodes.start // HEADINGS]
         return torch.from_numpy(np.ceil(factor * moves))
 
-    def _hear(self, hearing: Tensor | None) -> None:
+    def _hear(self, hearing: Mapping[str, Tensor] | None) -> None:
         """Lay the clips of `hearing` out flat, and find the row that each episode begins at."""
-        self._hearing: Tensor | None = None
+        self._hearing: dict[str, Tensor] = {}
         self._takes: Tensor | None = None
-        if hearing is None:
-            return
         wanted = (len(self.distances.goal), len(self.transitions), len(self.episodes.sounds))
-        if hearing.dim() != 5 or tuple(hearing.shape[:3]) != wanted:
-            raise ValueError(
-                f"hearing has shape {tuple(hearing.shape)}; wanted (sources, states, sounds, "
-                f"takes, features) with {wanted} in front"
-            )
-        _, states, sounds, takes, features = hearing.shape
-        self._hearing = hearing.reshape(-1, features)
+        for name, heard in (hearing or {}).items():
+            if heard.dim() < 4 or tuple(heard.shape[:3]) != wanted:
+                raise ValueError(
+                    f"hearing '{name}' has shape {tuple(heard.shape)}; wanted (sources, states, "
+                    f"sounds, takes, ...) with {wanted} in front"
+                )
+            self._hearing[name] = heard.flatten(0, 3)
+            takes = heard.shape[3]
+        if not self._hearing:
+            return
+        if len({len(heard) for heard in self._hearing.values()}) > 1:
+            raise ValueError("what is heard differs in its number of takes")
+        _, states, sounds = wanted
         self._clips_of_state = sounds * takes
         self._first_clip = self.source * states * self._clips_of_state + self.sound * takes
         if takes > 1:

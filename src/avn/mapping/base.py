@@ -1,0 +1,61 @@
+"""What a mapper is: it remembers the place for N agents at once, and says where they are."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from tensordict import TensorDict
+from torch import Tensor
+
+from avn.planning.partial_graph import GraphRules, PartialGraph
+
+
+class Mapper(ABC):
+    """Remembers the place for N agents.
+
+    Attributes
+    ----------
+    needs : tuple of str
+        Observations without which it cannot map.
+    explores : bool
+        Whether it is shown the exploration walk.
+    pose : (N, 3) int64 tensor
+        Column, row and heading of the agents on their maps.
+    location : (N, 2) float64 tensor
+        Column and row before they are rounded to a square.
+    graph : PartialGraph
+        Nodes and edges that the planner plans on.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ()
+    explores: ClassVar[bool] = False
+    pose: Tensor
+    location: Tensor
+    graph: PartialGraph
+
+    @abstractmethod
+    def reset(self, n: int, rules: GraphRules) -> None:
+        """Begin N new episodes, of which nothing is known."""
+
+    def explore(self, walks: TensorDict, walk: Tensor) -> None:
+        """Remember exploration walks.
+
+        Parameters
+        ----------
+        walks : TensorDict of batch size (W, T)
+            What was observed at each step of each walk, odometry since its own start.
+        walk : (N,) int64 tensor
+            Which walk each agent made.
+        """
+
+    @abstractmethod
+    def observe(self, observation: TensorDict, way: Tensor) -> None:
+        """Take in the newest observations: find the agents, and bring map and graph up to date.
+
+        Parameters
+        ----------
+        observation : TensorDict of batch size (N,)
+        way : (N,) int64 tensor
+            0 where the last action was a move forward, 2 a move backward, -1 none of both.
+        """

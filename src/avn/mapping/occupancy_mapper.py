@@ -1,0 +1,70 @@
+"""`mapper=occupancy`: a map of beliefs that grows from the start on, located by odometry."""
+
+from __future__ import annotations
+
+import torch
+from tensordict import TensorDict
+from torch import Tensor
+
+from avn.mapping.base import Mapper
+from avn.mapping.occupancy_map import OccupancyMap
+from avn.planning.partial_graph import GraphRules, PartialGraph
+
+
+class OccupancyMapper(Mapper):
+    """Sees which squares are free, and remembers where it stood and what it ran into.
+
+    Parameters
+    ----------
+    size : int
+        Squares along each side of the map, odd.
+    """
+
+    needs = ("window",)
+
+    def __init__(self, size: int = 101) -> None:
+        self.size = size
+
+    def reset(self, n: int, rules: GraphRules) -> None:
+        """Begin N new episodes, each in the middle of an unknown map."""
+        self.map = OccupancyMap(n, self.size)
+        self.graph = PartialGraph(n, self.size, rules)
+        self.graph.walls = self.map.walls.numpy()
+        self._last = torch.zeros(n, 3, dtype=torch.int64)
+
+    def observe(self, observation: TensorDict, way: Tensor) -> None:
+        """Locate the agents by odometry and take in what they see and ran into."""
+        pose = observation["odometry"]
+        squares = take_in(self.map, pose, self._last, observation, way)
+        self.graph.set(squares, torch.sigmoid(self.map.log_odds.flatten(1).gather(1, squares)))
+        self._last = pose
+        self.pose = pose + torch.tensor([self.map.centre, self.map.centre, 0])
+        self.location = self.pose[:, :2].double()
+
+
+def take_in(
+    beliefs: OccupancyMap, pose: Tensor, last: Tensor, observation: TensorDict, way: Tensor
+) -> Tensor:
+    """Bring a map up to date with what N agents observe.
+
+    Parameters
+    ----------
+    beliefs : OccupancyMap
+    pose, last : (N, 3) int64 tensors
+        Where the agents are now, and where they were before the last action.
+    observation : TensorDict
+        `collided`, and `window` where there is one.
+    way : (N,) int64 tensor
+        See `Mapper.observe`.
+
+    Returns
+    -------
+    (N, k) int64 tensor
+        The squares that may have changed, laid out flat.
+    """
+    stood = beliefs.stand(pose)
+    bumped = beliefs.bump(last, (last[:, 2] + way) % 4, observation["collided"] & (way >= 0))
+    squares = torch.stack((stood, bumped), dim=1)
+    if "window" in observation.keys():
+        squares = torch.cat((squares, beliefs.see(pose, observation["window"])), dim=1)
+    return squares
