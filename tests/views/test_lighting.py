@@ -71,7 +71,7 @@ def test_light_of_a_window_is_the_integral_over_its_pane():
     cfg = LightConfig(spacing=0.1, shadow_rays=64, gather_rays=1, bounces=0)
     mesh = floor(0.3, 0.1)
     light, points = baked(mesh, 0.5, no_lamps(), panes, cfg)
-    at = np.unravel_index(np.abs(mesh.vertices).sum(axis=2).argmin(), mesh.texture.shape + (3,))
+    at = np.unravel_index(np.abs(mesh.vertices).sum(axis=2).argmin(), (*mesh.texture.shape, 3))
     found = light[0, points.corner[at], 0]
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, 401), np.linspace(-0.3, 0.3, 401))
     expected = 2.0 * np.mean(4.0 / (x**2 + y**2 + 4.0) ** 2) * 0.6

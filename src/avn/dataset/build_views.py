@@ -22,7 +22,7 @@ from avn.dataset.scene import Scene
 from avn.dataset.views import VERSION, views_file, views_kind
 from avn.progress import progress_bar
 from avn.stages import digest, written_whole
-from avn.views.furniture import assets_hash
+from avn.views.models import assets_hash
 from avn.views.renderer import Renderer, RendererConfig, renderer_class
 
 # Raised when the code changes what it makes.

@@ -17,7 +17,7 @@ from avn.apartments.floor_plan import (
 from avn.apartments.surfaces import BUILDING, DOOR_FRAME, PANE, Rect, _subtract_all, build_surfaces
 from avn.views.decor import BORDER, DEPTH, Hanging, hangings
 from avn.views.drawing import draw, to_linear
-from avn.views.lights import LAMP_RADIUS, Light
+from avn.views.lights import PANE_RADIANCE, Lamps, Light, lamps_and_panes
 from avn.views.mesh import Mesh, boxes, join
 from avn.views.pools import COLOURS
 from avn.views.textures import Pattern, outdoors, pattern
@@ -25,10 +25,34 @@ from avn.views.textures import Pattern, outdoors, pattern
 SKIRTING = 0.08
 CASING = 0.07
 FRAME = 0.05
-# How bright a pane and a lamp look: less than they shine, as to an eye that is used to them.
-_PANE_LOOKS = 2.2
-_LAMP_LOOKS = 3.0
+# How bright a pane and a lamp look to the film: less than they shine, as to an eye that is used
+# to them.
+_PANE_LOOKS = 1.8
+_LAMP_LOOKS = 6.0
 _NEAR = 1e-6
+
+
+@dataclass(frozen=True)
+class Shell:
+    """The building as T triangles that face the air, and its lamps.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        `piece` is -1 throughout.
+    glow : (T, 3) float32
+        Light that the film gets of a triangle by itself, exposed; it multiplies the texture. 0 for
+        most.
+    shine : (T, 3) float32
+        Radiance with which it lights others, as `Lamps` and `Panes` have it.
+    shade : (T,) bool
+        Whether it keeps light off others; lamps' own fixtures do not.
+    """
+
+    mesh: Mesh
+    glow: NDArray[np.float32]
+    shine: NDArray[np.float32]
+    shade: NDArray[np.bool_]
 
 
 @dataclass
@@ -40,6 +64,7 @@ class _Builder:
     texture: list[int] = field(default_factory=list)
     colour: list[NDArray[np.float64]] = field(default_factory=list)
     glow: list[NDArray[np.float64]] = field(default_factory=list)
+    shine: list[NDArray[np.float64]] = field(default_factory=list)
     textures: list[NDArray[np.uint8]] = field(default_factory=list)
     known: dict[tuple[object, ...], tuple[int, Pattern]] = field(default_factory=dict)
 
@@ -58,6 +83,7 @@ class _Builder:
         texture: tuple[int, Pattern] | None = None,
         colour: NDArray[np.float64] | None = None,
         glow: NDArray[np.float64] | None = None,
+        shine: NDArray[np.float64] | None = None,
         whole: Rect | None = None,
     ) -> None:
         """Add a rectangle; `whole` is the part of the plane that the picture covers once."""
@@ -81,25 +107,29 @@ class _Builder:
         self.texture.append(-1 if texture is None else texture[0])
         self.colour.append(np.ones(3) if colour is None else colour)
         self.glow.append(np.zeros(3) if glow is None else glow)
+        self.shine.append(np.zeros(3) if shine is None else shine)
 
-    def mesh(self) -> tuple[Mesh, NDArray[np.float32]]:
+    def shell(self) -> Shell:
         corners, uv = np.stack(self.corners), np.stack(self.uv)
         count = 2 * len(corners)
         halves = np.array([[0, 1, 2], [0, 2, 3]])
-        return Mesh(
+        mesh = Mesh(
             vertices=corners[:, halves].reshape(-1, 3, 3).astype(np.float32),
             uv=uv[:, halves].reshape(-1, 3, 2).astype(np.float32),
             texture=np.repeat(np.array(self.texture, dtype=np.int32), 2),
             colour=np.repeat(np.stack(self.colour), 2, axis=0).astype(np.float32),
             textures=tuple(self.textures),
             piece=np.full(count, BUILDING, dtype=np.int32),
-        ), np.repeat(np.stack(self.glow), 2, axis=0).astype(np.float32)
+        )
+        glow, shine = (
+            np.repeat(np.stack(values), 2, axis=0).astype(np.float32)
+            for values in (self.glow, self.shine)
+        )
+        return Shell(mesh, glow, shine, np.ones(count, dtype=bool))
 
 
-def building(
-    plan: FloorPlan, part: str, look: int, light: Light
-) -> tuple[Mesh, NDArray[np.float32], NDArray[np.bool_]]:
-    """The shell of an apartment and its lamps.
+def building(plan: FloorPlan, part: str, look: int, light: Light) -> Shell:
+    """Build the shell of an apartment and hang its lamps and pictures.
 
     Parameters
     ----------
@@ -107,21 +137,11 @@ def building(
     part : {"train", "validation", "test"}
     look : int
     light : Light
-
-    Returns
-    -------
-    Mesh
-        T triangles that face the air, `piece` -1.
-    (T, 3) float32
-        Radiance that they show by themselves.
-    (T,) bool
-        Whether they keep light off others.
     """
     surfaces = build_surfaces(plan)
     builder = _Builder()
     trim = _trim_colour(plan, part, look)
-    shell = np.flatnonzero(surfaces.piece == BUILDING)
-    for q in shell:
+    for q in np.flatnonzero(surfaces.piece == BUILDING):
         axis, offset = int(surfaces.axis[q]), float(surfaces.offset[q])
         a0, b0, a1, b1 = (float(x) for x in (*surfaces.lower[q], *surfaces.upper[q]))
         rect = (a0, b0, a1, b1)
@@ -146,15 +166,16 @@ def building(
                 builder.rectangle(axis, offset, own, normal, texture)
     for number, hanging in enumerate(hangings(plan, part, look)):
         _hang(builder, hanging, number)
-    mesh, glow = builder.mesh()
-    shade = np.ones(len(mesh), dtype=bool)
+    shell = builder.shell()
     if not plan.lamps:
-        return mesh, glow, shade
-    fixtures, shine = _fixtures(plan, light)
-    return (
-        join((mesh, fixtures)),
-        np.concatenate((glow, shine)),
-        np.concatenate((shade, np.zeros(len(fixtures), dtype=bool))),
+        return shell
+    lamps, _ = lamps_and_panes(plan, light)
+    fixtures = _fixtures(lamps, light)
+    return Shell(
+        join((shell.mesh, fixtures.mesh)),
+        np.concatenate((shell.glow, fixtures.glow)),
+        np.concatenate((shell.shine, fixtures.shine)),
+        np.concatenate((shell.shade, fixtures.shade)),
     )
 
 
@@ -253,7 +274,8 @@ def _window(
             normal,
             picture,
             np.full(3, 0.05),
-            _PANE_LOOKS * light.sky,
+            _PANE_LOOKS * np.sqrt(light.sky),
+            PANE_RADIANCE * light.sky,
             whole=rect,
         )
 
@@ -277,12 +299,11 @@ def _hang(builder: _Builder, hanging: Hanging, number: int) -> None:
         builder.rectangle(2, offset, flat, sign, colour=frame)
 
 
-def _fixtures(plan: FloorPlan, light: Light) -> tuple[Mesh, NDArray[np.float32]]:
+def _fixtures(lamps: Lamps, light: Light) -> Shell:
     """A globe at each lamp and the rod that it hangs on."""
-    globe = _globe(LAMP_RADIUS)
-    centres = np.array([(p.x, p.y, p.z) for p in plan.lamps])
-    vertices = (centres[:, None, None] + globe[None]).reshape(-1, 3, 3)
-    count = len(vertices)
+    globe = _globe(lamps.radius)
+    vertices = (lamps.centre[:, None, None] + globe[None]).reshape(-1, 3, 3)
+    count, several = len(vertices), len(lamps.centre)
     globes = Mesh(
         vertices=vertices.astype(np.float32),
         uv=np.zeros((count, 3, 2), dtype=np.float32),
@@ -291,14 +312,15 @@ def _fixtures(plan: FloorPlan, light: Light) -> tuple[Mesh, NDArray[np.float32]]
         textures=(),
         piece=np.full(count, BUILDING, dtype=np.int32),
     )
-    lower = centres - (0.01, 0.01, 0.0)
-    upper = np.column_stack((centres[:, :2] + 0.01, np.full(len(centres), CEILING)))
-    rods = boxes(
-        lower, upper, np.full((len(centres), 3), 0.3, np.float32), np.full(len(centres), BUILDING)
-    )
-    shine = np.zeros((count + len(rods), 3), dtype=np.float32)
-    shine[:count] = _LAMP_LOOKS * light.lamp
-    return join((globes, rods)), shine
+    lower = lamps.centre - (0.01, 0.01, 0.0)
+    upper = np.column_stack((lamps.centre[:, :2] + 0.01, np.full(several, CEILING)))
+    grey = np.full((several, 3), 0.3, dtype=np.float32)
+    rods = boxes(lower, upper, grey, np.full(several, BUILDING))
+    glow = np.zeros((count + len(rods), 3), dtype=np.float32)
+    shine = np.zeros_like(glow)
+    glow[:count] = _LAMP_LOOKS * light.lamp
+    shine[:count] = np.repeat(lamps.intensity / (np.pi * lamps.radius**2), len(globe), axis=0)
+    return Shell(join((globes, rods)), glow, shine, np.zeros(len(glow), dtype=bool))
 
 
 def _globe(radius: float, rings: int = 6, spokes: int = 12) -> NDArray[np.float64]:
@@ -315,6 +337,6 @@ def _globe(radius: float, rings: int = 6, spokes: int = 12) -> NDArray[np.float6
     )
     a, b = point[:-1, :-1], point[1:, :-1]
     c, d = point[1:, 1:], point[:-1, 1:]
-    upper = np.stack((a, b, c), axis=2)[1:] if rings == 1 else np.stack((a, b, c), axis=2)[:-1]
-    lower = np.stack((a, c, d), axis=2)[1:]
+    upper = np.stack((a, b, c), axis=2)[:-1]
+    lower = np.stack((a, c, d), axis=2)[1:]  # without those that shrink to a line at the poles
     return radius * np.concatenate((upper.reshape(-1, 3, 3), lower.reshape(-1, 3, 3)))

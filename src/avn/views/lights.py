@@ -14,7 +14,8 @@ from avn.views.pools import LIGHT
 LAMP_RADIUS = 0.13
 # Intensity of a lamp for each square metre of its room.
 _LAMP_STRENGTH = 0.35
-_PANE_RADIANCE = 3.0
+# Radiance of the usual sky.
+PANE_RADIANCE = 3.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def lamps_and_panes(plan: FloorPlan, light: Light) -> tuple[Lamps, Panes]:
     geometry = np.array(panes, dtype=np.float64).reshape(-1, 4, 3)
     corner, side_a, side_b, normal = geometry.transpose(1, 0, 2)
     return lamps, Panes(
-        corner, side_a, side_b, normal, np.tile(_PANE_RADIANCE * light.sky, (len(panes), 1))
+        corner, side_a, side_b, normal, np.tile(PANE_RADIANCE * light.sky, (len(panes), 1))
     )
 
 

@@ -174,8 +174,8 @@ def shade(
             i, j, k3 = corner[t, 0], corner[t, 1], corner[t, 2]
             for k in range(3):
                 irradiance = a * light[side, i, k] + b * light[side, j, k] + c * light[side, k3, k]
-                seen = texel[k] * (colour[t, k] * irradiance / np.pi + glow[t, k])
-                out[p, k] += _film(seen * exposure)
+                passed_on = colour[t, k] * irradiance / np.pi
+                out[p, k] += film(texel[k] * (passed_on * exposure + glow[t, k]))
         if met:
             for k in range(3):
                 out[p, k] /= met
@@ -183,7 +183,7 @@ def shade(
 
 
 @numba.njit(cache=True)
-def _film(x: float) -> float:
+def film(x: float) -> float:
     """Linear light to displayed light.
 
     The curve of E. Reinhard et al., "Photographic tone reproduction for digital images",
