@@ -266,6 +266,8 @@ def _window(
         glass = _subtract_all(glass, [(middle - FRAME / 2, sill, middle + FRAME / 2, top)])
     for own in _subtract_all([rect], glass):
         builder.rectangle(axis, offset, own, normal, colour=trim)
+    # the whole opening counts as bright where light is worked out: the glass makes up for it
+    share = _area(rect) / sum(map(_area, glass))
     for own in glass:
         builder.rectangle(
             axis,
@@ -275,9 +277,13 @@ def _window(
             picture,
             np.full(3, 0.05),
             _PANE_LOOKS * np.sqrt(light.sky),
-            PANE_RADIANCE * light.sky,
+            share * PANE_RADIANCE * light.sky,
             whole=rect,
         )
+
+
+def _area(rect: Rect) -> float:
+    return (rect[2] - rect[0]) * (rect[3] - rect[1])
 
 
 def _hang(builder: _Builder, hanging: Hanging, number: int) -> None:
@@ -319,7 +325,10 @@ def _fixtures(lamps: Lamps, light: Light) -> Shell:
     glow = np.zeros((count + len(rods), 3), dtype=np.float32)
     shine = np.zeros_like(glow)
     glow[:count] = _LAMP_LOOKS * light.lamp
-    shine[:count] = np.repeat(lamps.intensity / (np.pi * lamps.radius**2), len(globe), axis=0)
+    # a convex body of surface S and radiance L has the mean intensity L S / 4 (Cauchy)
+    surface = np.linalg.norm(np.cross(globe[:, 1] - globe[:, 0], globe[:, 2] - globe[:, 0]), axis=1)
+    radiance = 4 * lamps.intensity / (surface.sum() / 2)
+    shine[:count] = np.repeat(radiance, len(globe), axis=0)
     return Shell(join((globes, rods)), glow, shine, np.zeros(len(glow), dtype=bool))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.views import shading
-from avn.views.camera import ray_directions
+from avn.views.eye import Eye
 from avn.views.lighting import LightConfig, bake, choose_points, normals_of
 from avn.views.mesh import BUILDING, split
 from avn.views.rays import Triangles
@@ -20,7 +20,7 @@ from avn.views.scenery import scenery
 # Levels of a picture that are skipped where only its colour near a triangle counts.
 _COARSE = 4
 # Brightness that what is seen is exposed to, on average over the eye's scale.
-_KEY = 0.55
+_KEY = 0.42
 
 
 @dataclass
@@ -61,7 +61,6 @@ class Raycast(Renderer):
         self.normal, self.area = normals_of(self.mesh.vertices)
         self.pyramids = shading.pyramids(self.mesh.textures)
         self.points = choose_points(self.mesh, cfg.light.spacing)
-        self._triangles = Triangles(self.mesh.vertices)
         self._prepared = prepared
         self._lookup = (
             self.pyramids.texels,
@@ -71,19 +70,7 @@ class Raycast(Renderer):
             shading.LINEAR,
         )
         self._density = self._texel_density()
-        camera = cfg.camera
-        self._rays = [self._fan(heading, cfg.samples) for heading in range(4)]
-        self._middles = [self._fan(heading, 1) for heading in range(4)]
-        self._pixel = 2 * math.tan(math.radians(camera.fov) / 2) / camera.size / cfg.samples
-        pitch = math.radians(camera.pitch)
-        sin, cos = np.array([0, 1, 0, -1]), np.array([1, 0, -1, 0])
-        self._axes = np.stack(
-            (math.cos(pitch) * sin, math.cos(pitch) * cos, np.full(4, math.sin(pitch))), axis=1
-        )
-
-    def _fan(self, heading: int, samples: int) -> NDArray[np.float32]:
-        rays = ray_directions(self.cfg.camera, heading, self.cfg.camera.size, samples)
-        return np.ascontiguousarray(rays.reshape(-1, 3).astype(np.float32))
+        self._eye = Eye(cfg.camera, Triangles(self.mesh.vertices), cfg.samples)
 
     def _texel_density(self) -> NDArray[np.float32]:
         """Pixels of its picture for each metre of a triangle, (T,)."""
@@ -139,17 +126,15 @@ class Raycast(Renderer):
         rgb = np.empty((len(centres), size, size, 3), dtype=np.uint8)
         depth = np.empty((len(centres), size, size), dtype=np.float16)
         for n, (centre, heading) in enumerate(zip(centres, headings, strict=True)):
-            place = np.array((*centre, self.cfg.camera.height), dtype=np.float32)
-            rays = self._rays[heading]
-            hits = self._triangles.meet(np.tile(place, (len(rays), 1)), rays)
+            hits = self._eye.look(centre, heading)
             seen = shading.shade(
                 hits.triangle,
                 hits.u,
                 hits.v,
                 hits.distance,
-                rays,
+                self._eye.rays[heading],
                 self.cfg.samples**2,
-                self._pixel,
+                self._eye.pixel,
                 self.normal,
                 self._density,
                 self.mesh.uv,
@@ -162,11 +147,5 @@ class Raycast(Renderer):
                 float(prepared["exposure"]),
             )
             rgb[n] = shading.encode(seen).reshape(size, size, 3)
-            depth[n] = self._depth(place, heading).reshape(size, size)
+            depth[n] = self._eye.depth(centre, heading)
         return rgb, depth
-
-    def _depth(self, place: NDArray[np.float32], heading: int) -> NDArray[np.float64]:
-        rays = self._middles[heading]
-        hits = self._triangles.meet(np.tile(place, (len(rays), 1)), rays)
-        along: NDArray[np.float64] = hits.distance * (rays @ self._axes[heading])
-        return np.where(hits.triangle < 0, 0.0, along)

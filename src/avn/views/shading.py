@@ -209,3 +209,13 @@ def encode(light: NDArray[np.float32]) -> NDArray[np.uint8]:
     """SRGB bytes of displayed light 0 to 1, flat."""
     found: NDArray[np.uint8] = _encode(light, _STEPS)
     return found
+
+
+@numba.njit(cache=True)
+def develop(light: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What the film makes of exposed light of any shape, flat."""
+    flat = light.ravel()
+    out = np.empty(len(flat), dtype=np.float32)
+    for n in range(len(flat)):
+        out[n] = film(flat[n])
+    return out
