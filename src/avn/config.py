@@ -18,9 +18,11 @@ from avn.agents.base import BaselineConfig
 from avn.agents.greedy import GreedyConfig
 from avn.agents.planner_agent import PlannerConfig
 from avn.apartments.splits import SplitConfig
+from avn.mapping.config import MapperConfig, MemoryConfig
 from avn.modules.sound_cnn import SoundModelConfig
 from avn.modules.stop_classifier import StopModelConfig
 from avn.navigation.protocols import ProtocolConfig
+from avn.views.backbone import BackboneConfig
 from avn.views.raycast import RaycastConfig
 from avn.views.renderer import RendererConfig
 
@@ -56,6 +58,8 @@ class CoreConfig:
     stop_model: StopModelConfig = MISSING
     protocol: ProtocolConfig = MISSING
     renderer: RendererConfig = MISSING
+    backbone: BackboneConfig = MISSING
+    mapper: MapperConfig = MISSING
     planner: PlannerConfig = MISSING
     baseline: BaselineConfig = MISSING
     look: str = MISSING
@@ -121,6 +125,9 @@ SCHEMAS = {
     ("protocol", "schema"): ProtocolConfig,
     ("renderer", "schema"): RendererConfig,
     ("renderer", "raycast_schema"): RaycastConfig,
+    ("backbone", "schema"): BackboneConfig,
+    ("mapper", "schema"): MapperConfig,
+    ("mapper", "memory_schema"): MemoryConfig,
     ("planner", "schema"): PlannerConfig(look=II("look")),
     ("baseline", "schema"): BaselineConfig,
     ("baseline", "greedy_schema"): GreedyConfig,

@@ -12,33 +12,39 @@ from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
-from avn import listening, pipeline
+from avn import listening, pipeline, senses
 from avn.acoustics.dry_sounds import content_hash, load_sounds
 from avn.agents.base import Agent
+from avn.acting import acting, build_agent
 from avn.dataset import build
 from avn.dataset.scene import Scene
 from avn.errors import UserError
 from avn.modules.hearing import sound_errors
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
+from avn.navigation.exploration import EXPLORATIONS
 from avn.navigation.protocols import Protocol
 from avn.navigation.run import Labels, walk_room
 from avn.reporting import results, table
 from avn.stages import check_name, digest, make_once, written_whole
 
 # Raised when the code of simulator, agents or metrics changes a record.
-VERSION = 2
+VERSION = 3
 RESULTS, EPISODE_RECORDS, HEARD = "results.csv", "episodes.csv", "hearing.csv"
-EPISODES = {"frozen": frozen_episodes, "exhaustive": exhaustive_episodes}
+EPISODES = ("frozen", "exhaustive")
 
 
 def run_hash(cfg: DictConfig) -> str:
     """Hash of what a run's records depend on."""
     acoustics = pipeline.acoustics_of(cfg)
-    apartments = [build.first_arrival_hash(p, acoustics) for p in pipeline.plans(cfg)["test"]]
-    ears = listening.hear_hash(cfg) if listening.hears(cfg) else None
-    rules = (cfg.protocol, cfg.baseline, cfg.agent, cfg.seed, cfg.episodes)
+    apartments = [build.first_arrival_hash(p, acoustics) for p in pipeline.plans(cfg)[cfg.part]]
+    observed = senses.senses_hash(cfg, _wanted(cfg))
+    rules = (cfg.protocol, cfg.agent, cfg.seed, cfg.episodes, cfg.exploration)
     sounds = list(content_hash(listening.sound_files(cfg)).items())
-    return digest(apartments, ears, rules, sounds, VERSION)
+    return digest(apartments, observed, rules, acting(cfg), sounds, VERSION)
+
+
+def _wanted(cfg: DictConfig) -> tuple[str, ...]:
+    return build_agent(cfg).wants(instantiate(cfg.protocol))
 
 
 def run_folder_name(cfg: DictConfig) -> str:
@@ -65,10 +71,12 @@ def evaluate(cfg: DictConfig) -> Path:
         raise UserError(f"seed: {cfg.seed} is out of range; give 0 or more")
     if cfg.episodes not in EPISODES:
         raise UserError(f"episodes: '{cfg.episodes}' is none of {', '.join(EPISODES)}")
+    if cfg.part not in pipeline.PARTS:
+        raise UserError(f"part: '{cfg.part}' is none of {', '.join(pipeline.PARTS)}")
+    if cfg.exploration not in EXPLORATIONS:
+        raise UserError(f"exploration: '{cfg.exploration}' is none of {', '.join(EXPLORATIONS)}")
     protocol: Protocol = instantiate(cfg.protocol)
-    agent: Agent | None = instantiate(cfg.baseline) if cfg.baseline._target_ else None
-    if agent is None:
-        raise UserError("baseline: 'none' cannot act; choose random_walk, greedy or oracle")
+    agent = build_agent(cfg)
     if agent.privileged != cfg.agent.privileged:
         raise UserError(
             f"agent.privileged: {cfg.agent.privileged}, but '{type(agent).__name__}' is "
@@ -80,22 +88,26 @@ def evaluate(cfg: DictConfig) -> Path:
         folder,
         f"run of '{cfg.agent.name}' with seed {cfg.seed}",
         done=(folder / RESULTS).is_file,
-        make=lambda: _walk(cfg, agent, protocol, folder),
+        make=lambda: _walk(cfg, protocol, folder),
     )
     return folder
 
 
-def _walk(cfg: DictConfig, agent: Agent, protocol: Protocol, folder: Path) -> None:
-    rooms = pipeline.scenes(cfg, ("test",))["test"]
-    hearing: list[Any] = [None] * len(rooms)
-    if listening.hears(cfg):
-        pipeline.scenes(cfg, ("test",), audible=True)
-        hearing = listening.hearing(cfg, rooms)
-        _write_heard(cfg, rooms, hearing, folder)
-    labels = Labels(agent=cfg.agent.name, acoustics=cfg.acoustics.name)
+def _walk(cfg: DictConfig, protocol: Protocol, folder: Path) -> None:
+    rooms = pipeline.scenes(cfg, (cfg.part,))[cfg.part]
+    wanted = _wanted(cfg)
+    hearing, sights = senses.heard(cfg, rooms, wanted), senses.seen(cfg, rooms, wanted)
+    if "sound" in wanted and listening.hears(cfg):
+        _write_heard(cfg, rooms, [own["sound"] for own in hearing], folder)
+    agent = build_agent(cfg, ready=True)
+    labels = Labels(
+        agent="-true-".join((cfg.agent.name, *cfg.agent.truth)),
+        acoustics=cfg.acoustics.name,
+        look=cfg.look if cfg.planner._target_ else "once",
+    )
     walked = [
-        walk_room(agent, room, episodes_of(cfg, room, protocol), protocol, labels, heard)
-        for room, heard in zip(rooms, hearing, strict=True)
+        walk_room(agent, room, episodes_of(cfg, room, protocol), protocol, labels, heard, seen)
+        for room, heard, seen in zip(rooms, hearing, sights, strict=True)
     ]
     episodes = pd.concat(walked, ignore_index=True)
     summary = results.summarise(episodes)
@@ -119,7 +131,10 @@ def _write_heard(
 
 def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
     """The episodes of a room as the config asks for them."""
-    return EPISODES[cfg.episodes](room, list(listening.sound_files(cfg)), protocol, cfg.seed)
+    sounds = list(listening.sound_files(cfg))
+    if cfg.episodes == "exhaustive":
+        return exhaustive_episodes(room, sounds, protocol, cfg.seed)
+    return frozen_episodes(room, sounds, protocol, cfg.seed, cfg.exploration)
 
 
 def read(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -151,7 +166,10 @@ def show(cfg: DictConfig, folder: Path) -> None:
 def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
     """TensorBoard's scalars by room and sound, and hparams with SR and SPL to compare runs by."""
     settings = {key: cfg[key].name for key in ("agent", "protocol", "acoustics", "split")}
-    settings |= {"seed": cfg.seed, "episodes": cfg.episodes}
+    settings |= {key: cfg[key].name for key in ("sound_model", "mapper", "planner")}
+    settings |= {"seed": cfg.seed, "train_seed": cfg.train_seed, "episodes": cfg.episodes}
+    settings |= {key: cfg[key] for key in ("look", "exploration", "localisation")}
+    settings |= {"part": cfg.part, "source": cfg.planner.source}
     settings["sounds"] = "-".join(listening.sound_files(cfg))
     figures = results.headline(summary)
     with SummaryWriter(str(folder)) as writer:

@@ -63,7 +63,9 @@ class PlannerAgent(Agent):
         Whether it may walk backward, where it sees nothing.
     patience : int
         Quarter turns in one place after which it holds to the source as it heard it last until it
-        has moved: what is heard facing one way may contradict what is heard facing another.
+        has moved: what is heard facing one way may contradict what is heard facing another. After
+        twice as many, and four more where it looks around, it walks straight on: where it takes
+        itself to be may contradict itself too.
     stop_at : float
         Where the protocol has Stop, the probability of being within reach from which it says so.
     """
@@ -115,8 +117,11 @@ class PlannerAgent(Agent):
         running = observation["running"]
         self._listen(observation["sound"], running.numpy())
         actions = self._planned(running.numpy())
+        spins = self._turns >= 2 * self.patience
         if self.look == "around":
             actions = torch.where(self._all_seen(), actions, ROTATE_RIGHT)
+            spins = self._turns >= 2 * self.patience + HEADINGS
+        actions = torch.where(spins, FORWARD, actions)
         if self.protocol.says_stop:
             actions = torch.where(observation["reach"] >= self.stop_at, STOP, actions)
         self._way = torch.where(actions == FORWARD, 0, torch.where(actions == BACKWARD, 2, -1))

@@ -29,9 +29,7 @@ class FrameVotes:
         self._voted = torch.zeros(n, HEADINGS * size * size, dtype=torch.bool)
         self._winner = torch.full((n,), -1)
 
-    def vote(
-        self, pose: Tensor, similarity: Tensor, places: Tensor, confidence: float
-    ) -> Tensor:
+    def vote(self, pose: Tensor, similarity: Tensor, places: Tensor, confidence: float) -> Tensor:
         """Count the votes of the newest pictures; a place and heading votes once.
 
         Parameters

@@ -65,6 +65,7 @@ class MemoryMapper(Mapper):
             raise UserError("mapper.sharpness and mapper.confidence are over 0")
         self.size, self.top, self.localisation = size, top, localisation
         self.edges, self.sharpness, self.confidence = edges, sharpness, confidence
+        self.windows = windows
         self.needs = ("feature", "window") if windows else ("feature",)  # type: ignore[misc]
 
     def reset(self, n: int, rules: GraphRules) -> None:
@@ -109,7 +110,7 @@ class MemoryMapper(Mapper):
         similarity, places = memory.recall(observation["feature"])
         found = locate(similarity, places)
         pose = found.round().long()
-        squares = take_in(self.map, pose, self._last, observation, way)
+        squares = take_in(self.map, pose, self._last, observation, way, self.windows)
         self.graph.set(squares, torch.sigmoid(self.map.log_odds.flatten(1).gather(1, squares)))
         memory.add(observation["feature"], pose, similarity[:, 0] < 1 - 1e-4)
         self._place(pose, found[:, :2])
@@ -118,7 +119,7 @@ class MemoryMapper(Mapper):
         self, memory: SpatialMemory, observation: TensorDict, way: Tensor
     ) -> None:
         pose = observation["odometry"]
-        squares = take_in(self.map, pose, self._last, observation, way)
+        squares = take_in(self.map, pose, self._last, observation, way, self.windows)
         similarity, places = memory.recall(observation["feature"], own=False)
         changed = self._votes.vote(pose, similarity, places, self.confidence)
         wrong = ((self.map.log_odds <= -CERTAIN) & (self._laid >= CERTAIN)).flatten(1).any(dim=1)
@@ -170,7 +171,7 @@ class MemoryMapper(Mapper):
         for step in range(steps):
             pose = walks["odometry"][:, step]
             here = known.stand(pose)
-            if "window" in self.needs:
+            if self.windows:
                 known.see(pose, walks["window"][:, step])
             moved = (pose[:, :2] != before[:, :2]).any(dim=1)
             joined[own, known.flat(before[:, :2]), pose[:, 2]] |= moved  # it only walks forward

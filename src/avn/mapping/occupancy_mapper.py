@@ -35,7 +35,7 @@ class OccupancyMapper(Mapper):
     def observe(self, observation: TensorDict, way: Tensor) -> None:
         """Locate the agents by odometry and take in what they see and ran into."""
         pose = observation["odometry"]
-        squares = take_in(self.map, pose, self._last, observation, way)
+        squares = take_in(self.map, pose, self._last, observation, way, sees=True)
         self.graph.set(squares, torch.sigmoid(self.map.log_odds.flatten(1).gather(1, squares)))
         self._last = pose
         self.pose = pose + torch.tensor([self.map.centre, self.map.centre, 0])
@@ -43,7 +43,12 @@ class OccupancyMapper(Mapper):
 
 
 def take_in(
-    beliefs: OccupancyMap, pose: Tensor, last: Tensor, observation: TensorDict, way: Tensor
+    beliefs: OccupancyMap,
+    pose: Tensor,
+    last: Tensor,
+    observation: TensorDict,
+    way: Tensor,
+    sees: bool,
 ) -> Tensor:
     """Bring a map up to date with what N agents observe.
 
@@ -53,9 +58,11 @@ def take_in(
     pose, last : (N, 3) int64 tensors
         Where the agents are now, and where they were before the last action.
     observation : TensorDict
-        `collided`, and `window` where there is one.
+        `collided`, and `window` where it sees.
     way : (N,) int64 tensor
         See `Mapper.observe`.
+    sees : bool
+        Whether the map takes in which squares look free.
 
     Returns
     -------
@@ -65,6 +72,6 @@ def take_in(
     stood = beliefs.stand(pose)
     bumped = beliefs.bump(last, (last[:, 2] + way) % 4, observation["collided"] & (way >= 0))
     squares = torch.stack((stood, bumped), dim=1)
-    if "window" in observation.keys():
+    if sees:
         squares = torch.cat((squares, beliefs.see(pose, observation["window"])), dim=1)
     return squares

@@ -104,9 +104,7 @@ class SourceSearch:
         squares = np.clip(place[chosen, None] + around, 0, size - 1)
         self.searched[chosen[:, None], squares[..., 1], squares[..., 0]] = True
 
-    def targets(
-        self, cost: NDArray[np.float32], running: NDArray[np.bool_]
-    ) -> NDArray[np.int64]:
+    def targets(self, cost: NDArray[np.float32], running: NDArray[np.bool_]) -> NDArray[np.int64]:
         """The node where each agent now looks for the source, (N, 2) column and row.
 
         Of the nodes that were not searched, the one nearest to the newest estimate, or the one

@@ -1,0 +1,107 @@
+"""What an agent hears and sees in the apartments that it walks, made where it is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from omegaconf import DictConfig
+from torch import Tensor
+
+from avn import listening, pipeline, recognition, seeing
+from avn.datamodules.sound import where_sources_are
+from avn.dataset.scene import Scene
+
+SOUNDS, SIGHTS = ("sound", "reach"), ("view", "depth", "feature", "window")
+
+
+def heard(
+    cfg: DictConfig, rooms: Sequence[Scene], wanted: Sequence[str]
+) -> list[dict[str, Tensor]]:
+    """What is heard in each room, by the name of the observation.
+
+    Parameters
+    ----------
+    wanted : sequence of str
+        Observations that the agent needs; those that are not heard are left out, and so is what
+        the config has no network for.
+
+    Returns
+    -------
+    list of dict of (K, S, sounds, takes, ...) tensor
+    """
+    found: list[dict[str, Tensor]] = [{} for _ in rooms]
+    if not set(wanted) & set(SOUNDS):
+        return found
+    if "sound" in wanted and "location" in cfg.agent.truth:
+        for room, own in zip(rooms, found, strict=True):
+            where = where_sources_are(room)[0][:, :, None, None]
+            own["sound"] = where.expand(-1, -1, len(cfg.sound), cfg.takes, -1)
+    elif "sound" in wanted and listening.hears(cfg):
+        pipeline.scenes(cfg, (cfg.part,), audible=True)
+        for own, estimates in zip(found, listening.hearing(cfg, rooms), strict=True):
+            own["sound"] = estimates
+    if "reach" in wanted and listening.can_stop(cfg):
+        pipeline.scenes(cfg, (cfg.part,), audible=True)
+        for own, scores in zip(found, listening.stop_scores(cfg, rooms), strict=True):
+            own["reach"] = scores
+    return found
+
+
+def seen(cfg: DictConfig, rooms: Sequence[Scene], wanted: Sequence[str]) -> list[dict[str, Tensor]]:
+    """What is seen in each room, by the name of the observation; as `heard`.
+
+    Returns
+    -------
+    list of dict of (S, ...) tensor
+    """
+    found: list[dict[str, Tensor]] = [{} for _ in rooms]
+    if "window" in wanted and "window" in cfg.agent.truth:
+        for room, own in zip(rooms, found, strict=True):
+            free, visible = seeing.true_windows(cfg, room)
+            own["window"] = torch.where(visible, free.float(), torch.nan)
+    elif "window" in wanted and seeing.sees_windows(cfg):
+        windows, visible = seeing.windows(cfg, rooms), seeing.sights(cfg, rooms)
+        for own, free, sight in zip(found, windows, visible, strict=True):
+            own["window"] = torch.where(sight >= cfg.mapper.visible_above, free, torch.nan)
+    if "feature" in wanted:
+        for own, features in zip(
+            found, recognition.features(cfg, (cfg.part,))[cfg.part], strict=True
+        ):
+            own["feature"] = features
+    if {"view", "depth"} & set(wanted):
+        pipeline.seen_scenes(cfg, (cfg.part,))
+        hashes = pipeline.views_hashes(cfg, (cfg.part,))[cfg.part]
+        for room, own, made_from in zip(rooms, found, hashes, strict=True):
+            views = room.views(cfg.renderer.name, made_from)
+            if "view" in wanted:
+                own["view"] = torch.from_numpy(views.rgb[:]).permute(0, 3, 1, 2)
+            if "depth" in wanted:
+                own["depth"] = torch.from_numpy(views.depth[:])
+    return found
+
+
+def senses_hash(cfg: DictConfig, wanted: Sequence[str]) -> list[Any]:
+    """What the observations of an agent depend on beside the apartments, for the run's hash."""
+    parts: list[Any] = []
+    if "sound" in wanted and listening.hears(cfg) and "location" not in cfg.agent.truth:
+        parts.append(listening.hear_hash(cfg))
+    if "reach" in wanted and listening.can_stop(cfg):
+        parts += [listening.stop_hash(cfg), cfg.stop_model.criterion, cfg.stop_model.threshold]
+    if set(wanted) & set(SIGHTS):
+        views = pipeline.views_hashes(cfg, (cfg.part,))[cfg.part]
+        if "feature" in wanted:
+            parts.append([recognition.features_hash(cfg, own) for own in views])
+        if {"view", "depth"} & set(wanted):
+            parts.append(views)
+        if "window" in wanted:
+            true = "window" in cfg.agent.truth
+            parts.append(cfg.renderer.camera if true else _window_hash(cfg, views))
+    return parts
+
+
+def _window_hash(cfg: DictConfig, views: list[str]) -> Any:
+    if not seeing.sees_windows(cfg):
+        return None
+    return [seeing.see_hash(cfg), cfg.mapper.visible_above, views]
