@@ -9,18 +9,20 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from avn import learned, listening
+from avn import learned, listening, seeing
 from avn.cli import command
 from avn.errors import UserError
 from avn.stages import tell
 
-# What opens or trains each model, and how the figures begin that are printed, over all sounds.
+# What opens or trains each model, and how the figures begin that are printed, over all
+# sounds.
 MODELS: dict[str, tuple[Callable[..., tuple[Any, Path]], tuple[str, ...]]] = {
     "sound_cnn": (listening.sound_model, ("error_m/", "bearing_deg/")),
     "stop_classifier": (
         listening.stop_model,
         ("auc/validation", "ece/validation", "threshold/", "miss/", "false_"),
     ),
+    "occupancy_cnn": (seeing.occupancy_model, ("accuracy/", "auc/", "ece/", "loss/")),
 }
 
 
@@ -33,7 +35,7 @@ def main(cfg: DictConfig) -> Path:
     _, folder = open_model(cfg, asked=True)
     metrics = learned.read_metrics(folder)
     for name in sorted(metrics):
-        if name.startswith(begin) and ("/all" in name or name.count("/") == 1):
+        if name.startswith(begin) and name.split("/")[-1] not in listening.TRAINING_SOUNDS:
             tell(f"{name}: {metrics[name]:.3g}")
     tell(str(folder))
     return folder
