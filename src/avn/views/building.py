@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -68,8 +69,11 @@ class _Builder:
     textures: list[NDArray[np.uint8]] = field(default_factory=list)
     known: dict[tuple[object, ...], tuple[int, Pattern]] = field(default_factory=dict)
 
-    def picture(self, made: Pattern, *key: object) -> tuple[int, Pattern]:
+    def picture(self, paint: Callable[..., Pattern], *names: object) -> tuple[int, Pattern]:
+        """Number of a picture, painted the first time that it is asked for by these names."""
+        key = (paint, *names)
         if key not in self.known:
+            made = paint(*names)
             self.known[key] = (len(self.textures), made)
             self.textures.append(made.picture)
         return self.known[key]
@@ -148,14 +152,14 @@ def building(plan: FloorPlan, part: str, look: int, light: Light) -> Shell:
         material = surfaces.materials[surfaces.material[q]]
         room, normal = _side(plan, axis, offset, rect)
         if material == PANE and axis != 2:
-            picture = builder.picture(outdoors(part, plan.name, look), "outdoors")
+            picture = builder.picture(outdoors, part, plan.name, look)
             _window(builder, axis, offset, rect, normal, picture, light, trim)
         elif room < 0 and material == DOOR_FRAME:
             builder.rectangle(axis, offset, rect, normal, colour=trim)
         else:
             where = "wall" if axis != 2 else "floor" if normal > 0 else "ceiling"
             key = (plan.name, max(room, 0), where, look)
-            texture = builder.picture(pattern(material, part, *key), *key)
+            texture = builder.picture(pattern, material, part, *key)
             rects = [rect]
             if axis != 2:
                 strips = _strips(plan, axis, offset, rect)
@@ -164,8 +168,8 @@ def building(plan: FloorPlan, part: str, look: int, light: Light) -> Shell:
                 rects = _subtract_all(rects, strips)
             for own in rects:
                 builder.rectangle(axis, offset, own, normal, texture)
-    for number, hanging in enumerate(hangings(plan, part, look)):
-        _hang(builder, hanging, number)
+    for hanging in hangings(plan, part, look):
+        _hang(builder, hanging)
     shell = builder.shell()
     if not plan.lamps:
         return shell
@@ -286,9 +290,10 @@ def _area(rect: Rect) -> float:
     return (rect[2] - rect[0]) * (rect[3] - rect[1])
 
 
-def _hang(builder: _Builder, hanging: Hanging, number: int) -> None:
+def _hang(builder: _Builder, hanging: Hanging) -> None:
     """A picture in its frame, which stands out from the wall a little."""
-    texture = builder.picture(hanging.picture, "hanging", number)
+    texture = len(builder.textures), hanging.picture
+    builder.textures.append(hanging.picture.picture)
     frame = to_linear(hanging.frame)
     axis, normal = hanging.axis, hanging.normal
     front = hanging.offset + normal * DEPTH

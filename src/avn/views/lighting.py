@@ -23,6 +23,9 @@ from avn.views.rays import Triangles
 LIFT = 1e-3
 # Points that are worked on at once: bounds the memory.
 _AT_ONCE = 1 << 20
+# Rays that tell whether a point is walled in: all end within so many metres.
+_FEW = 12
+_NARROW = 0.5
 _SEED_DIRECT = 1
 _SEED_GATHER = 2
 
@@ -322,23 +325,48 @@ def _gather(
     points: Points,
     rays: int,
 ) -> NDArray[np.int32]:
-    """Which face each point sees along each ray, (P, rays): 2 t before, 2 t + 1 behind, -1 none."""
+    """Which face each point sees along each ray, (P, rays): 2 t before, 2 t + 1 behind, -1 none.
+
+    Where the first few rays get nowhere (the insides of furniture) they stand for the others.
+    """
     seen = np.empty((len(points.place), rays), dtype=np.int32)
+    few = min(_FEW, rays)
     step = max(1, _AT_ONCE // rays)
     for start in range(0, len(seen), step):
-        rows = slice(start, start + step)
-        directions = _cosine_rays(points.normal[rows], start, rays)
-        origins = np.repeat(points.place[rows], rays, axis=0)
-        hits = triangles.meet(origins, directions)
-        found = solid[np.maximum(hits.triangle, 0)]
-        behind = np.einsum("ni,ni->n", directions, normal[found]) > 0
-        faces = np.where(hits.triangle < 0, -1, 2 * found + behind)
-        seen[rows] = faces.reshape(-1, rays)
+        numbers = np.arange(start, min(start + step, len(seen)))
+        found, far = _look(triangles, solid, normal, points, numbers, 0, few)
+        seen[numbers] = np.resize(found.T, (rays, len(numbers))).T
+        open_ = numbers[far.max(axis=1) > _NARROW]
+        if few < rays:
+            seen[open_, few:] = _look(triangles, solid, normal, points, open_, few, rays)[0]
     return seen
 
 
+def _look(
+    triangles: Triangles,
+    solid: NDArray[np.int64],
+    normal: NDArray[np.float32],
+    points: Points,
+    numbers: NDArray[np.int64],
+    first: int,
+    last: int,
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Faces that some points see along rays `first` to `last`, and how far away they are."""
+    directions = _cosine_rays(points.normal[numbers], numbers, first, last)
+    origins = np.repeat(points.place[numbers], last - first, axis=0)
+    hits = triangles.meet(origins, directions)
+    met = solid[np.maximum(hits.triangle, 0)]
+    behind = np.einsum("ni,ni->n", directions, normal[met]) > 0
+    faces = np.where(hits.triangle < 0, -1, 2 * met + behind).astype(np.int32)
+    shape = (len(numbers), last - first)
+    return faces.reshape(shape), hits.distance.reshape(shape)
+
+
 @numba.njit(cache=True)
-def _cosine_rays(normal: NDArray[np.float32], start: int, rays: int) -> NDArray[np.float32]:
+def _cosine_rays(
+    normal: NDArray[np.float32], numbers: NDArray[np.int64], first: int, last: int
+) -> NDArray[np.float32]:
+    rays = last - first
     out = np.empty((len(normal) * rays, 3), dtype=np.float32)
     for p in range(len(normal)):
         x, y, z = normal[p]
@@ -346,14 +374,14 @@ def _cosine_rays(normal: NDArray[np.float32], start: int, rays: int) -> NDArray[
         sign = 1.0 if z >= 0 else -1.0
         a = -1.0 / (sign + z)
         b = x * y * a
-        turn_a = _random(_SEED_GATHER, start + p, 0)
-        turn_b = _random(_SEED_GATHER, start + p, 1)
-        for ray in range(rays):
+        turn_a = _random(_SEED_GATHER, numbers[p], 0)
+        turn_b = _random(_SEED_GATHER, numbers[p], 1)
+        for ray in range(first, last):
             s = (turn_a + ray * _R2_A) % 1.0
             angle = 2 * np.pi * ((turn_b + ray * _R2_B) % 1.0)
             r, up = np.sqrt(s), np.sqrt(1.0 - s)
             u, v = r * np.cos(angle), r * np.sin(angle)
-            n = p * rays + ray
+            n = p * rays + ray - first
             out[n, 0] = u * (1.0 + sign * x * x * a) + v * b + up * x
             out[n, 1] = u * sign * b + v * (sign + y * y * a) + up * y
             out[n, 2] = -u * sign * x - v * y + up * z

@@ -60,7 +60,6 @@ class Raycast(Renderer):
         self.shade = self.scenery.shade[origin]
         self.normal, self.area = normals_of(self.mesh.vertices)
         self.pyramids = shading.pyramids(self.mesh.textures)
-        self.points = choose_points(self.mesh, cfg.light.spacing)
         self._prepared = prepared
         self._lookup = (
             self.pyramids.texels,
@@ -94,9 +93,10 @@ class Raycast(Renderer):
         return found
 
     def prepare(self) -> Prepared:
-        """Irradiance at all corners, and the exposure that suits it."""
+        """Irradiance at all corners, whose corners they are, and the exposure that suits it."""
         if self._prepared is None:
             albedo = self.albedo()
+            points = choose_points(self.mesh, self.cfg.light.spacing)
             light = bake(
                 self.mesh,
                 albedo,
@@ -104,15 +104,20 @@ class Raycast(Renderer):
                 self.scenery.lamps,
                 self.scenery.panes,
                 self.cfg.light,
-                self.points,
+                points,
             )
-            self._prepared = {"light": light, "exposure": np.array(self._exposure(albedo, light))}
+            exposure = self._exposure(albedo, light[0][points.corner])
+            self._prepared = {
+                "light": light,
+                "corner": points.corner,
+                "exposure": np.array(exposure),
+            }
         return self._prepared
 
     def _exposure(self, albedo: NDArray[np.float32], light: NDArray[np.float32]) -> float:
-        """What brings the middle of what the building shows to a given brightness."""
+        """What brings the building, its corners lit with (T, 3, 3), to a middling brightness."""
         own = (self.mesh.piece == BUILDING) & (self.glow.max(axis=1) == 0)
-        irradiance = light[0][self.points.corner[own]].mean(axis=1)
+        irradiance = light[own].mean(axis=1)
         bright = (albedo[own] * irradiance / np.pi) @ np.array((0.2126, 0.7152, 0.0722))
         logs = np.log(np.maximum(bright, 1e-4))
         return _KEY / float(np.exp(np.average(logs, weights=self.area[own])))
@@ -141,7 +146,7 @@ class Raycast(Renderer):
                 self.mesh.texture,
                 self.mesh.colour,
                 self.glow,
-                self.points.corner,
+                prepared["corner"],
                 prepared["light"],
                 *self._lookup,
                 float(prepared["exposure"]),

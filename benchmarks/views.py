@@ -1,0 +1,113 @@
+"""Time and memory of `renderer=raycast` against other ways to see an apartment without a screen.
+
+Peers, each used where it is installed: pybullet's TinyRenderer, a rasteriser on one thread that
+draws the same triangles in plain colours with shadows of one lamp, and Blender's Cycles, which
+follows the light of the same scene (`renderer=cycles`). Ours counts the baking of light once an
+apartment, spread over its views. All run on one thread of this process and report its processor
+time.
+
+Run from the repository: ``python benchmarks/views.py``.
+"""
+
+import argparse
+import importlib.util
+import math
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from avn.apartments.generator import generate
+from avn.apartments.grid import build_grid
+from avn.views.cycles import Cycles, CyclesConfig
+from avn.views.raycast import Raycast, RaycastConfig
+from avn.views.scenery import scenery
+
+
+def timed(make, *arguments):
+    """What a call gives, and the processor time that it took."""
+    begin = time.process_time()
+    made = make(*arguments)
+    return made, time.process_time() - begin
+
+
+def run_raycast(plan, centres, headings, views):
+    """Seconds a view with and without its share of the bake."""
+    Raycast(RaycastConfig(), generate(1, "small", 1, "small"), "train").views(
+        centres[:1] * 0 + 1, headings[:1]
+    )  # compiles, or loads what is compiled
+    (renderer, opened) = timed(Raycast, RaycastConfig(), plan, "train")
+    _, baked = timed(renderer.prepare)
+    _, seen = timed(renderer.views, centres, headings)
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    alone = seen / len(centres)
+    whole = alone + (opened + baked) / views
+    print(
+        f"raycast: {alone * 1000:.0f} ms a view, {opened + baked:.1f} s to open and light an "
+        f"apartment of {views} views, {whole * 1000:.0f} ms a view in all; {memory:.0f} MB, "
+        f"{len(renderer.mesh)} triangles"
+    )
+    return whole
+
+
+def run_cycles(plan, centres, headings):
+    """Seconds a view of Blender's, without its start."""
+    renderer = Cycles(CyclesConfig(), plan, "train")
+    renderer.views(centres[:1], headings[:1])
+    return timed(renderer.views, centres, headings)[1] / len(centres)
+
+
+def run_pybullet(plan, centres, headings):
+    """Seconds a view of pybullet's software rasteriser."""
+    import pybullet
+
+    client = pybullet.connect(pybullet.DIRECT)
+    vertices = scenery(plan, "train").mesh.vertices.reshape(-1, 3)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "apartment.obj"
+        with path.open("w") as file:
+            np.savetxt(file, vertices, "v %.4f %.4f %.4f")
+            np.savetxt(file, np.arange(len(vertices)).reshape(-1, 3) + 1, "f %d %d %d")
+        shape = pybullet.createVisualShape(pybullet.GEOM_MESH, fileName=str(path))
+        pybullet.createMultiBody(baseVisualShapeIndex=shape)
+    projection = pybullet.computeProjectionMatrixFOV(90, 1.0, 0.02, 30)
+
+    def draw():
+        for centre, heading in zip(centres, headings, strict=True):
+            turn = math.pi / 2 * heading
+            eye = np.array((*centre, 1.5))
+            to = eye + np.array((math.sin(turn), math.cos(turn), -math.tan(math.pi / 6)))
+            view = pybullet.computeViewMatrix(eye, to, (0, 0, 1))
+            pybullet.getCameraImage(
+                128, 128, view, projection, renderer=pybullet.ER_TINY_RENDERER, shadow=1
+            )
+
+    draw_seconds = timed(draw)[1]
+    pybullet.disconnect(client)
+    return draw_seconds / len(centres)
+
+
+def main():
+    """Print seconds a view and ratios."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=5, help="of the apartment")
+    parser.add_argument("--views", type=int, default=48, help="views that are timed")
+    arguments = parser.parse_args()
+    plan = generate(arguments.seed, "home", sources=5, size="mixed")
+    grid = build_grid(plan)
+    states = np.linspace(0, 4 * grid.cells - 1, arguments.views).astype(int)
+    centres, headings = grid.centres[states // 4], states % 4
+    ours = run_raycast(plan, centres, headings, 4 * grid.cells)
+    peers = {"pybullet": ("pybullet", run_pybullet), "Cycles": ("bpy", run_cycles)}
+    for name, (module, run) in peers.items():
+        if importlib.util.find_spec(module) is None:
+            print(f"{name}: {module} is not installed")
+            continue
+        theirs = run(plan, centres, headings)
+        print(f"{name}: {theirs * 1000:.0f} ms a view, {theirs / ours:.1f} times ours")
+
+
+if __name__ == "__main__":
+    main()
