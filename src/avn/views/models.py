@@ -55,7 +55,8 @@ def furniture_mesh(plan: FloorPlan, part: str, look: int = 0) -> Mesh:
     """
     meshes = [_placed(plan, index, part, look) for index in range(len(plan.furniture))]
     if not meshes:
-        return boxes(*np.zeros((2, 0, 3)), np.zeros((0, 3), np.float32), np.zeros(0, np.int32))
+        none = np.zeros((0, 3))
+        return boxes(none, none, none.astype(np.float32), np.zeros(0, dtype=np.int32))
     return _sharing_pictures(join(meshes))
 
 
