@@ -138,3 +138,14 @@ def test_both_faces_of_a_thin_board_have_points_of_their_own():
     top, bottom = points.front[normal[:, 2] > 0.9], points.front[normal[:, 2] < -0.9]
     assert not set(top) & set(bottom)
     assert (points.back >= points.front.max()).all()
+
+
+def test_a_sheet_close_under_another_does_not_darken_it():
+    outer = boxes(np.zeros((1, 3)), np.array([(0.5, 0.5, 0.5)]), np.ones((1, 3)), np.array([0]))
+    hidden = boxes(np.full((1, 3), 0.004), np.full((1, 3), 0.496), np.ones((1, 3)), np.array([0]))
+    cfg = LightConfig(spacing=0.07, shadow_rays=8, gather_rays=1, bounces=0)
+    for pair in ((outer, hidden), (hidden, outer)):
+        mesh = split(join(pair), 0.1)[0]
+        light, points = baked(mesh, 0.5, lamp((0.25, 0.25, 2.0), 1.0), NO_PANES, cfg)
+        top = (mesh.vertices[..., 2] > 0.499).all(axis=1)
+        assert light[0][points.corner[top]].min() > 0.2

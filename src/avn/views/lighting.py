@@ -89,6 +89,17 @@ def _numbered(*columns: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[n
     return first, number
 
 
+def _first(
+    number: NDArray[np.int64], rank: NDArray[np.float64], area: NDArray[np.float32]
+) -> NDArray[np.int64]:
+    """Of each group the triangle of least rank, and of those the largest.
+
+    Models hide sheets close under others: what stands out farthest is what is seen.
+    """
+    order = np.lexsort((-area, rank, number))
+    return order[np.flatnonzero(np.diff(number[order], prepend=-1))]
+
+
 def normals_of(vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Unit normals (T, 3) and areas (T,) of triangles; those without an area look up."""
     v = vertices.astype(np.float64)
@@ -101,20 +112,23 @@ def normals_of(vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDAr
 
 def choose_points(mesh: Mesh, spacing: float) -> Points:
     """Group triangles that lie within `spacing` and face the same way."""
-    normal, _ = normals_of(mesh.vertices)
+    normal, area = normals_of(mesh.vertices)
     centre = mesh.vertices.astype(np.float64).mean(axis=1)
+    height = (centre * normal).sum(axis=1)
     facing = np.rint(normal * 2).astype(np.int64)
     voxel = np.floor(centre / spacing).astype(np.int64)
     # two faces of a board are apart by its thickness only
-    layer = np.floor((centre * normal).sum(axis=1) / 0.01 + 0.5).astype(np.int64)
-    first, number = _numbered(*voxel.T, *facing.T, layer)
+    layer = np.floor(height / 0.01 + 0.5).astype(np.int64)
+    _, number = _numbered(*voxel.T, *facing.T, layer)
+    outer, inmost = (_first(number, np.rint(sign * height / 0.002), area) for sign in (-1, 1))
     front = number.astype(np.int32)
     inner = mesh.piece != BUILDING
     sides, back_of = np.unique(number[inner], return_inverse=True)
     back = np.full(len(mesh), -1, dtype=np.int32)
-    back[inner] = len(first) + back_of
-    fronts, backs = normal[first], -normal[first[sides]]
-    place = np.concatenate((centre[first], centre[first[sides]]))
+    back[inner] = len(outer) + back_of
+    inmost = inmost[sides]
+    fronts, backs = normal[outer], -normal[inmost]
+    place = np.concatenate((centre[outer], centre[inmost]))
     along = np.concatenate((fronts, backs))
     corners = np.rint(mesh.vertices.reshape(-1, 3).astype(np.float64) * 1000).astype(np.int64)
     _, corner = _numbered(*corners.T, *np.repeat(facing, 3, axis=0).T)
