@@ -115,3 +115,17 @@ def test_a_renderer_that_is_not_there_is_told_in_one_line(made):
     cfg = RaycastConfig(_target_="avn.views.nothing.Nothing", name="nothing")
     with pytest.raises(UserError, match=r"renderer\._target_"):
         build_views.build_views([(made, "train")], cfg, processes=1)
+
+
+@pytest.mark.parametrize(
+    ("key", "cfg"),
+    [
+        ("camera.size", RaycastConfig(camera=CameraConfig(size=0))),
+        ("camera.height", RaycastConfig(camera=CameraConfig(height=3.0))),
+        ("samples", RaycastConfig(samples=0)),
+        ("light.spacing", RaycastConfig(light=LightConfig(spacing=0.0))),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(made, key, cfg):
+    with pytest.raises(UserError, match=rf"renderer\.{key}: .*; give"):
+        build_views.build_views([(made, "train")], cfg, processes=1)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from avn.views import lighting
-from avn.views.lighting import LightConfig, bake, choose_points, normals_of
+from avn.views.light_points import choose_points, normals_of
+from avn.views.lighting import LightConfig, bake
 from avn.views.lights import Lamps, Panes
 from avn.views.mesh import Mesh, boxes, join, split
 

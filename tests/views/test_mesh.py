@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from avn.views.lighting import normals_of
+from avn.views.light_points import normals_of
 from avn.views.mesh import boxes, join, split, take
 
 

@@ -106,7 +106,7 @@ def build_views(
     UserError
         Where a file was made from other settings, or the renderer is not installed.
     """
-    renderer_class(cfg).check_installed()
+    renderer_class(cfg).check(cfg)
     missing = [
         (which, part, look)
         for which, part in apartments

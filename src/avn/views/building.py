@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,118 +15,19 @@ from avn.apartments.floor_plan import (
 from avn.apartments.surfaces import BUILDING, DOOR_FRAME, PANE, Rect, _subtract_all, build_surfaces
 from avn.views.decor import BORDER, DEPTH, Hanging, hangings
 from avn.views.drawing import draw, to_linear
-from avn.views.lights import PANE_RADIANCE, Lamps, Light, lamps_and_panes
-from avn.views.mesh import Mesh, boxes, join
+from avn.views.fixtures import fixtures
+from avn.views.lights import PANE_RADIANCE, Light, lamps_and_panes
+from avn.views.mesh import join
 from avn.views.pools import COLOURS
+from avn.views.shell import Shell, ShellBuilder
 from avn.views.textures import Pattern, outdoors, pattern
 
 SKIRTING = 0.08
 CASING = 0.07
 FRAME = 0.05
-# How bright a pane and a lamp look to the film: less than they shine, as to an eye that is used
-# to them.
+# How bright a pane looks to the film: less than it shines, as to an eye that is used to it.
 _PANE_LOOKS = 1.8
-_LAMP_LOOKS = 6.0
 _NEAR = 1e-6
-
-
-@dataclass(frozen=True)
-class Shell:
-    """The building as T triangles that face the air, and its lamps.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        `piece` is -1 throughout.
-    glow : (T, 3) float32
-        Light that the film gets of a triangle by itself, exposed; it multiplies the texture. 0 for
-        most.
-    shine : (T, 3) float32
-        Radiance with which it lights others, as `Lamps` and `Panes` have it.
-    shade : (T,) bool
-        Whether it keeps light off others; lamps' own fixtures do not.
-    """
-
-    mesh: Mesh
-    glow: NDArray[np.float32]
-    shine: NDArray[np.float32]
-    shade: NDArray[np.bool_]
-
-
-@dataclass
-class _Builder:
-    """Collects rectangles and the pictures on them."""
-
-    corners: list[NDArray[np.float64]] = field(default_factory=list)
-    uv: list[NDArray[np.float64]] = field(default_factory=list)
-    texture: list[int] = field(default_factory=list)
-    colour: list[NDArray[np.float64]] = field(default_factory=list)
-    glow: list[NDArray[np.float64]] = field(default_factory=list)
-    shine: list[NDArray[np.float64]] = field(default_factory=list)
-    textures: list[NDArray[np.uint8]] = field(default_factory=list)
-    known: dict[tuple[object, ...], tuple[int, Pattern]] = field(default_factory=dict)
-
-    def picture(self, paint: Callable[..., Pattern], *names: object) -> tuple[int, Pattern]:
-        """Number of a picture, painted the first time that it is asked for by these names."""
-        key = (paint, *names)
-        if key not in self.known:
-            made = paint(*names)
-            self.known[key] = (len(self.textures), made)
-            self.textures.append(made.picture)
-        return self.known[key]
-
-    def rectangle(
-        self,
-        axis: int,
-        offset: float,
-        rect: Rect,
-        normal: float,
-        texture: tuple[int, Pattern] | None = None,
-        colour: NDArray[np.float64] | None = None,
-        glow: NDArray[np.float64] | None = None,
-        shine: NDArray[np.float64] | None = None,
-        whole: Rect | None = None,
-    ) -> None:
-        """Add a rectangle; `whole` is the part of the plane that the picture covers once."""
-        a, b = (1, 2) if axis == 0 else (0, 2) if axis == 1 else (0, 1)
-        place = np.array(
-            [(rect[0], rect[1]), (rect[2], rect[1]), (rect[2], rect[3]), (rect[0], rect[3])]
-        )
-        corners = np.empty((4, 3))
-        corners[:, axis], corners[:, a], corners[:, b] = offset, place[:, 0], place[:, 1]
-        uv = np.zeros((4, 2))
-        if texture is not None:
-            if whole is None:
-                uv = place / (texture[1].width, texture[1].height)
-            else:
-                uv = (place - whole[:2]) / (whole[2] - whole[0], whole[3] - whole[1])
-        facing = np.cross(corners[1] - corners[0], corners[2] - corners[0])[axis]
-        if facing * normal < 0:
-            corners, uv = corners[::-1], uv[::-1]
-        self.corners.append(corners)
-        self.uv.append(uv)
-        self.texture.append(-1 if texture is None else texture[0])
-        self.colour.append(np.ones(3) if colour is None else colour)
-        self.glow.append(np.zeros(3) if glow is None else glow)
-        self.shine.append(np.zeros(3) if shine is None else shine)
-
-    def shell(self) -> Shell:
-        corners, uv = np.stack(self.corners), np.stack(self.uv)
-        count = 2 * len(corners)
-        halves = np.array([[0, 1, 2], [0, 2, 3]])
-        mesh = Mesh(
-            vertices=corners[:, halves].reshape(-1, 3, 3).astype(np.float32),
-            uv=uv[:, halves].reshape(-1, 3, 2).astype(np.float32),
-            texture=np.repeat(np.array(self.texture, dtype=np.int32), 2),
-            colour=np.repeat(np.stack(self.colour), 2, axis=0).astype(np.float32),
-            textures=tuple(self.textures),
-            piece=np.full(count, BUILDING, dtype=np.int32),
-        )
-        glow, shine = (
-            np.repeat(np.stack(values), 2, axis=0).astype(np.float32)
-            for values in (self.glow, self.shine)
-        )
-        return Shell(mesh, glow, shine, np.ones(count, dtype=bool))
 
 
 def building(plan: FloorPlan, part: str, look: int, light: Light) -> Shell:
@@ -143,7 +41,7 @@ def building(plan: FloorPlan, part: str, look: int, light: Light) -> Shell:
     light : Light
     """
     surfaces = build_surfaces(plan)
-    builder = _Builder()
+    builder = ShellBuilder()
     trim = _trim_colour(plan, part, look)
     for q in np.flatnonzero(surfaces.piece == BUILDING):
         axis, offset = int(surfaces.axis[q]), float(surfaces.offset[q])
@@ -174,12 +72,12 @@ def building(plan: FloorPlan, part: str, look: int, light: Light) -> Shell:
     if not plan.lamps:
         return shell
     lamps, _ = lamps_and_panes(plan, light)
-    fixtures = _fixtures(lamps, light)
+    hung = fixtures(lamps, light)
     return Shell(
-        join((shell.mesh, fixtures.mesh)),
-        np.concatenate((shell.glow, fixtures.glow)),
-        np.concatenate((shell.shine, fixtures.shine)),
-        np.concatenate((shell.shade, fixtures.shade)),
+        join((shell.mesh, hung.mesh)),
+        np.concatenate((shell.glow, hung.glow)),
+        np.concatenate((shell.shine, hung.shine)),
+        np.concatenate((shell.shade, hung.shade)),
     )
 
 
@@ -253,7 +151,7 @@ def _strips(plan: FloorPlan, axis: int, offset: float, rect: Rect) -> list[Rect]
 
 
 def _window(
-    builder: _Builder,
+    builder: ShellBuilder,
     axis: int,
     offset: float,
     rect: Rect,
@@ -290,7 +188,7 @@ def _area(rect: Rect) -> float:
     return (rect[2] - rect[0]) * (rect[3] - rect[1])
 
 
-def _hang(builder: _Builder, hanging: Hanging) -> None:
+def _hang(builder: ShellBuilder, hanging: Hanging) -> None:
     """A picture in its frame, which stands out from the wall a little."""
     texture = len(builder.textures), hanging.picture
     builder.textures.append(hanging.picture.picture)
@@ -308,49 +206,3 @@ def _hang(builder: _Builder, hanging: Hanging) -> None:
     for offset, sign in ((sill, -1.0), (top, 1.0)):
         flat = (deep[0], low, deep[1], high) if axis == 0 else (low, deep[0], high, deep[1])
         builder.rectangle(2, offset, flat, sign, colour=frame)
-
-
-def _fixtures(lamps: Lamps, light: Light) -> Shell:
-    """A globe at each lamp and the rod that it hangs on."""
-    globe = _globe(lamps.radius)
-    vertices = (lamps.centre[:, None, None] + globe[None]).reshape(-1, 3, 3)
-    count, several = len(vertices), len(lamps.centre)
-    globes = Mesh(
-        vertices=vertices.astype(np.float32),
-        uv=np.zeros((count, 3, 2), dtype=np.float32),
-        texture=np.full(count, -1, dtype=np.int32),
-        colour=np.full((count, 3), 0.8, dtype=np.float32),
-        textures=(),
-        piece=np.full(count, BUILDING, dtype=np.int32),
-    )
-    lower = lamps.centre - (0.01, 0.01, 0.0)
-    upper = np.column_stack((lamps.centre[:, :2] + 0.01, np.full(several, CEILING)))
-    grey = np.full((several, 3), 0.3, dtype=np.float32)
-    rods = boxes(lower, upper, grey, np.full(several, BUILDING))
-    glow = np.zeros((count + len(rods), 3), dtype=np.float32)
-    shine = np.zeros_like(glow)
-    glow[:count] = _LAMP_LOOKS * light.lamp
-    # a convex body of surface S and radiance L has the mean intensity L S / 4 (Cauchy)
-    surface = np.linalg.norm(np.cross(globe[:, 1] - globe[:, 0], globe[:, 2] - globe[:, 0]), axis=1)
-    radiance = 4 * lamps.intensity / (surface.sum() / 2)
-    shine[:count] = np.repeat(radiance, len(globe), axis=0)
-    return Shell(join((globes, rods)), glow, shine, np.zeros(len(glow), dtype=bool))
-
-
-def _globe(radius: float, rings: int = 6, spokes: int = 12) -> NDArray[np.float64]:
-    """Triangles (N, 3, 3) of a sphere, seen from outside counter-clockwise."""
-    polar = np.linspace(0, np.pi, rings + 1)
-    turn = np.linspace(0, 2 * np.pi, spokes + 1)
-    point = np.stack(
-        (
-            np.sin(polar)[:, None] * np.cos(turn),
-            np.sin(polar)[:, None] * np.sin(turn),
-            np.cos(polar)[:, None] * np.ones_like(turn),
-        ),
-        axis=-1,
-    )
-    a, b = point[:-1, :-1], point[1:, :-1]
-    c, d = point[1:, 1:], point[:-1, 1:]
-    upper = np.stack((a, b, c), axis=2)[:-1]
-    lower = np.stack((a, c, d), axis=2)[1:]  # without those that shrink to a line at the poles
-    return radius * np.concatenate((upper.reshape(-1, 3, 3), lower.reshape(-1, 3, 3)))

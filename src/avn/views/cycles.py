@@ -26,7 +26,13 @@ from avn.views.eye import Eye
 from avn.views.lighting import LightConfig
 from avn.views.raycast import Raycast, RaycastConfig
 from avn.views.rays import Triangles
-from avn.views.renderer import Prepared, Renderer, RendererConfig
+from avn.views.renderer import (
+    Prepared,
+    Renderer,
+    RendererConfig,
+    check_light,
+    check_range,
+)
 from avn.views.scenery import Scenery, scenery
 
 _INSTALL = (
@@ -77,7 +83,7 @@ class Cycles(Renderer):
         prepared: Prepared | None = None,
     ) -> None:
         assert isinstance(cfg, CyclesConfig)
-        self.check_installed()
+        self.check(cfg)
         self.cfg = cfg
         self._made_from = (plan, part, look)
         self._scenery = scenery(plan, part, look)
@@ -85,8 +91,13 @@ class Cycles(Renderer):
         self._eye = Eye(cfg.camera, Triangles(self._scenery.mesh.vertices))
 
     @classmethod
-    def check_installed(cls) -> None:
-        """Raise `UserError` where `bpy` is not installed."""
+    def check(cls, cfg: RendererConfig) -> None:
+        """See `Renderer.check`."""
+        super().check(cfg)
+        assert isinstance(cfg, CyclesConfig)
+        check_range("samples", cfg.samples, 1, 65536)
+        check_range("bounces", cfg.bounces, 0, 1024)
+        check_light(cfg.light)
         if importlib.util.find_spec("bpy") is None:
             raise UserError(_INSTALL.format("is not installed"))
 

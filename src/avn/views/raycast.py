@@ -11,10 +11,17 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import FloorPlan
 from avn.views import shading
 from avn.views.eye import Eye
-from avn.views.lighting import LightConfig, bake, choose_points, normals_of
+from avn.views.light_points import choose_points, normals_of
+from avn.views.lighting import LightConfig, bake
 from avn.views.mesh import BUILDING, split
 from avn.views.rays import Triangles
-from avn.views.renderer import Prepared, Renderer, RendererConfig
+from avn.views.renderer import (
+    Prepared,
+    Renderer,
+    RendererConfig,
+    check_light,
+    check_range,
+)
 from avn.views.scenery import scenery
 
 # Levels of a picture that are skipped where only its colour near a triangle counts.
@@ -70,6 +77,14 @@ class Raycast(Renderer):
         )
         self._density = self._texel_density()
         self._eye = Eye(cfg.camera, Triangles(self.mesh.vertices), cfg.samples)
+
+    @classmethod
+    def check(cls, cfg: RendererConfig) -> None:
+        """See `Renderer.check`."""
+        super().check(cfg)
+        assert isinstance(cfg, RaycastConfig)
+        check_range("samples", cfg.samples, 1, 16)
+        check_light(cfg.light)
 
     def _texel_density(self) -> NDArray[np.float32]:
         """Pixels of its picture for each metre of a triangle, (T,)."""

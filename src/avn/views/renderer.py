@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.apartments.floor_plan import FloorPlan
+from avn.apartments.floor_plan import CEILING, FloorPlan
 from avn.errors import UserError
 from avn.views.camera import CameraConfig
+from avn.views.lighting import LightConfig
 
 Prepared = dict[str, NDArray]
 
@@ -58,9 +59,15 @@ class Renderer(ABC):
     ) -> None: ...
 
     @classmethod
-    def check_installed(cls) -> None:
-        """Raise `UserError` where something that the renderer needs is not installed."""
-        return
+    def check(cls, cfg: RendererConfig) -> None:
+        """Raise `UserError` for a value that makes no sense, or where something is not installed.
+
+        A renderer with settings of its own looks at them too.
+        """
+        check_range("camera.size", cfg.camera.size, 1, 4096)
+        check_range("camera.height", cfg.camera.height, 0.05, CEILING - 0.05)
+        check_range("camera.pitch", cfg.camera.pitch, -89, 89)
+        check_range("camera.fov", cfg.camera.fov, 1, 170)
 
     @abstractmethod
     def prepare(self) -> Prepared:
@@ -85,6 +92,21 @@ class Renderer(ABC):
         (N, size, size) float16
             Metres along the camera's axis to what the middle of the pixel shows; 0 for nothing.
         """
+
+
+def check_range(key: str, value: float, low: float, high: float) -> None:
+    """Raise `UserError` where a setting of the renderer is out of bounds."""
+    if not low <= value <= high:
+        raise UserError(f"renderer.{key}: {value}; give {low:g} to {high:g}")
+
+
+def check_light(cfg: LightConfig) -> None:
+    """Raise `UserError` where light cannot be baked so."""
+    check_range("light.spacing", cfg.spacing, 0.02, 1.0)
+    check_range("light.shadow_rays", cfg.shadow_rays, 1, 4096)
+    check_range("light.gather_rays", cfg.gather_rays, 1, 4096)
+    check_range("light.bounces", cfg.bounces, 0, 100)
+    check_range("light.smoothing", cfg.smoothing, 0, 100)
 
 
 def renderer_class(cfg: RendererConfig) -> type[Renderer]:
