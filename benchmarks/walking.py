@@ -133,7 +133,7 @@ def plain_walk(tables: Tables, calls: list[tuple[int, int, int]], takes: list[li
 def compare(place: DrawnPlace, episodes: Episodes) -> None:
     """Measure both on the same episodes, see that they agree, and print."""
     hearing = made_up_hearing(place)
-    simulator = Simulator(place, episodes, VAR, hearing)
+    simulator = Simulator(place, episodes, VAR, {"sound": hearing})
     walk(Greedy(), simulator)
     begin = time.perf_counter()
     walk(Greedy(), simulator)
@@ -184,7 +184,7 @@ def rows(places: list[DrawnPlace]) -> None:
             episodes = frozen_episodes(place, SOUNDS, VAR, seed=0)
             hearing = made_up_hearing(place)
             labels = Labels(name, "resonance")
-            frames.append(walk_room(agent, place, episodes, VAR, labels, hearing))
+            frames.append(walk_room(agent, place, episodes, VAR, labels, {"sound": hearing}))
         frame = pd.concat(frames)
         summarise(frame)
         seconds = time.perf_counter() - begin

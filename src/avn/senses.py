@@ -63,8 +63,8 @@ def seen(cfg: DictConfig, rooms: Sequence[Scene], wanted: Sequence[str]) -> list
             own["window"] = torch.where(visible, free.float(), torch.nan)
     elif "window" in wanted and seeing.sees_windows(cfg):
         windows, visible = seeing.windows(cfg, rooms), seeing.sights(cfg, rooms)
-        for own, free, sight in zip(found, windows, visible, strict=True):
-            own["window"] = torch.where(sight >= cfg.mapper.visible_above, free, torch.nan)
+        for own, said, sight in zip(found, windows, visible, strict=True):
+            own["window"] = torch.where(sight >= cfg.mapper.visible_above, said, torch.nan)
     if "feature" in wanted:
         for own, features in zip(
             found, recognition.features(cfg, (cfg.part,))[cfg.part], strict=True

@@ -63,7 +63,7 @@ def test_with_true_hearing_it_arrives_in_an_empty_room(
     hall: DrawnPlace, protocol: Protocol
 ) -> None:
     episodes = exhaustive_episodes(hall, ["ring"], protocol, seed=0)
-    frame = walk_room(Greedy(), hall, episodes, protocol, LABELS, true_hearing(hall))
+    frame = walk_room(Greedy(), hall, episodes, protocol, LABELS, {"sound": true_hearing(hall)})
     assert (frame["collisions"] == 0).all()
     assert (frame["success"] == 1).all()
     assert (frame["spl"] == 1.0).all()
@@ -71,7 +71,7 @@ def test_with_true_hearing_it_arrives_in_an_empty_room(
 
 def test_it_is_blind_to_walls(flat: DrawnPlace, protocol: Protocol) -> None:
     episodes = exhaustive_episodes(flat, ["ring"], protocol, seed=0)
-    frame = walk_room(Greedy(), flat, episodes, protocol, LABELS, true_hearing(flat))
+    frame = walk_room(Greedy(), flat, episodes, protocol, LABELS, {"sound": true_hearing(flat)})
     near, far = frame["rooms_crossed"] == 0, frame["rooms_crossed"] > 0
     assert frame["success"][near].mean() > frame["success"][far].mean() + 0.2
     assert frame["collisions"][far].mean() > 1

@@ -124,7 +124,9 @@ def test_unprivileged_agents_get_observations_alone(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring"], protocols["stop"], seed=0)
-    simulator = Simulator(two_rooms, episodes, protocols["stop"], torch.rand(2, 204, 1, 1, 2))
+    simulator = Simulator(
+        two_rooms, episodes, protocols["stop"], {"sound": torch.rand(2, 204, 1, 1, 2)}
+    )
     agent = Curious()
     walk(agent, simulator)
     assert set(vars(agent)) == {"given", "n", "generator", "protocol"}
@@ -160,8 +162,8 @@ def test_agents_do_not_know_the_numbers_of_states(
     hearing = 4 * torch.randn(2, 204, 1, 1, 2, generator=torch.Generator().manual_seed(0))
     episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
     moved = type(episodes)(**{**vars(episodes), "start": np.argsort(states)[episodes.start]})
-    first = Simulator(two_rooms, episodes, rules, hearing)
-    second = Simulator(other, moved, rules, hearing[:, states])
+    first = Simulator(two_rooms, episodes, rules, {"sound": hearing})
+    second = Simulator(other, moved, rules, {"sound": hearing[:, states]})
     walk(agent, first)
     walk(agent, second)
     assert (torch.from_numpy(states)[second.state] == first.state).all()

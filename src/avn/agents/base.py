@@ -70,6 +70,11 @@ class Agent(ABC):
         walk : (N,) int64 tensor
             Which walk belongs to each episode.
         """
+        return
+
+    def rest(self, done: Tensor) -> None:
+        """Be told which episodes are over, (N,) bool, to save the work of acting in them."""
+        return
 
     @abstractmethod
     def act(self, observation: TensorDict) -> Tensor:

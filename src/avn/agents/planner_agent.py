@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -20,7 +22,12 @@ from avn.planning.partial_graph import GraphRules
 from avn.planning.shortest_path import NO_ACTION, first_actions
 from avn.planning.source_search import HearingError, SourceSearch
 
+if TYPE_CHECKING:
+    from avn.navigation.simulator import Simulator
+
 LOOKS = ("once", "around")
+# Parts in whose place it can be given the truth.
+TRUTH = ("location", "window", "map", "pose")
 # A turn costs so little where it is free that it only decides between equal walks.
 _TIE = 0.01
 
@@ -68,6 +75,9 @@ class PlannerAgent(Agent):
         itself to be may contradict itself too.
     stop_at : float
         Where the protocol has Stop, the probability of being within reach from which it says so.
+    truth : sequence of str
+        Parts in whose place it is given the truth, which makes it privileged: `location` of the
+        source and `window` come with the observations, `map` and `pose` go to the mapper.
     """
 
     def __init__(
@@ -81,8 +91,12 @@ class PlannerAgent(Agent):
         backward: bool = False,
         patience: int = 4,
         stop_at: float = 0.5,
+        truth: Sequence[str] = (),
         name: str = "dijkstra",
     ) -> None:
+        for part in truth:
+            if part not in TRUTH:
+                raise UserError(f"agent.truth: '{part}' is none of {', '.join(TRUTH)}")
         if look not in LOOKS:
             raise UserError(f"look: '{look}' is none of {', '.join(LOOKS)}")
         self.mapper, self.look, self.source = mapper, look, source
@@ -91,6 +105,7 @@ class PlannerAgent(Agent):
         if patience < 1:
             raise UserError(f"planner.patience: {patience} is less than 1, so it could not turn")
         self.backward, self.patience, self.stop_at = backward, patience, stop_at
+        self.truth, self.privileged = tuple(truth), bool(truth)  # type: ignore[misc]
         self.explores = mapper.explores
         self.needs = ("sound", *mapper.needs)  # type: ignore[misc]
 
@@ -103,20 +118,32 @@ class PlannerAgent(Agent):
         super().reset(n, generator, protocol)
         self.mapper.reset(n, self.rules)
         self._search: SourceSearch | None = None
+        # An episode without Stop ends in the cells round the source already.
+        self._near = 1 if protocol.goal == "box" and not protocol.says_stop else 0
+        self._running = np.ones(n, dtype=np.bool_)
         self._way = torch.full((n,), -1)
         self._turns = torch.zeros(n, dtype=torch.int64)
         self._looked = torch.zeros(n, 0, dtype=torch.int64)
+
+    def reveal(self, simulator: Simulator) -> None:
+        """Show the mapper what it is given of the truth."""
+        for part in ("map", "pose"):
+            if part in self.truth:
+                self.mapper.reveal(part, simulator)
 
     def explore(self, walks: TensorDict, walk: Tensor) -> None:
         """Remember exploration walks; see `Mapper.explore`."""
         self.mapper.explore(walks, walk)
 
+    def rest(self, done: Tensor) -> None:
+        """Plan no more for episodes that are over."""
+        self._running = ~done.numpy()
+
     def act(self, observation: TensorDict) -> Tensor:
         """One action for every episode, along the path planned now."""
         self.mapper.observe(observation, self._way)
-        running = observation["running"]
-        self._listen(observation["sound"], running.numpy())
-        actions = self._planned(running.numpy())
+        self._listen(observation["sound"], self._running)
+        actions = self._planned(self._running)
         spins = self._turns >= 2 * self.patience
         if self.look == "around":
             actions = torch.where(self._all_seen(), actions, ROTATE_RIGHT)
@@ -141,7 +168,7 @@ class PlannerAgent(Agent):
         self._search.listen(place, aim.numpy(), mirrored.numpy(), listens)
         # Where no Stop is needed, an episode that goes on tells that none of the cells around
         # holds the source; where it is, that the place itself does not.
-        self._search.rule_out(place, 0 if self.protocol.says_stop else 1, running)
+        self._search.rule_out(place, self._near, running)
 
     def _planned(self, running: np.ndarray) -> Tensor:
         """The first action of the shortest path; a turn where there is no path to walk."""
@@ -157,6 +184,7 @@ class PlannerAgent(Agent):
             1.0 if self.protocol.counts_turns else _TIE,
             0.0 if self.backward else np.inf,
             running,
+            self._near,
         )
         return torch.from_numpy(np.where(action == NO_ACTION, ROTATE_RIGHT, action))
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from tensordict import TensorDict
 from torch import Tensor
 
+from avn.errors import UserError
 from avn.planning.partial_graph import GraphRules, PartialGraph
+
+if TYPE_CHECKING:
+    from avn.navigation.simulator import Simulator
 
 
 class Mapper(ABC):
@@ -48,6 +52,17 @@ class Mapper(ABC):
         walk : (N,) int64 tensor
             Which walk each agent made.
         """
+        return
+
+    def reveal(self, part: str, simulator: Simulator) -> None:
+        """Take in a part of the truth, for ablations: the true `map`, or the true `pose`.
+
+        Raises
+        ------
+        UserError
+            Where this mapper has no use for it.
+        """
+        raise UserError(f"agent.truth: '{part}' is nothing that {type(self).__name__} can be shown")
 
     @abstractmethod
     def observe(self, observation: TensorDict, way: Tensor) -> None:

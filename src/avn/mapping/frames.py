@@ -60,6 +60,10 @@ class FrameVotes:
         self._votes.scatter_add_(1, index, torch.where(inside, weight, 0.0))
         return self._elect(confidence)
 
+    def settle(self, shift: Tensor, turn: Tensor) -> None:
+        """Let the frames lie where they are told to, (N, 2) and (N,), whatever is voted."""
+        self._votes.scatter_(1, self._index(turn, shift)[:, None], torch.inf)
+
     def refuse(self, rows: Tensor) -> Tensor:
         """Take the winner of some agents out for ever; gives the same rows, where they had one."""
         chosen = rows & (self._winner >= 0)

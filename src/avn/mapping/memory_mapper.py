@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import torch
 from tensordict import TensorDict
 from torch import Tensor
@@ -15,6 +17,9 @@ from avn.mapping.pose import turned
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.navigation.actions import HEADINGS
 from avn.planning.partial_graph import GraphRules, PartialGraph
+
+if TYPE_CHECKING:
+    from avn.navigation.simulator import Simulator
 
 LOCALISATIONS = ("retrieval", "retrieval+odometry")
 
@@ -91,6 +96,16 @@ class MemoryMapper(Mapper):
             self._votes = FrameVotes(len(walk), self.size, self.sharpness)
             self._laid = torch.zeros_like(self.map.log_odds)
             self._laid_walls = torch.zeros_like(self.map.walls)
+
+    def reveal(self, part: str, simulator: Simulator) -> None:
+        """Take in where the walk truly lies in the frame of the start."""
+        if part != "pose" or self.localisation == "retrieval":
+            super().reveal(part, simulator)
+        lattice = torch.from_numpy(simulator.place.grid.lattice).long()
+        first = torch.from_numpy(simulator.episodes.walks[:, 0])[simulator.episodes.walk]
+        start, heading = simulator.start, first % HEADINGS
+        shift = lattice[start // HEADINGS] - lattice[first // HEADINGS]
+        self._votes.settle(turned(shift, -heading % HEADINGS), (start - first) % HEADINGS)
 
     def observe(self, observation: TensorDict, way: Tensor) -> None:
         """Find the agents, and bring map, memory and graph up to date."""

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import torch
 from tensordict import TensorDict
 from torch import Tensor
 
 from avn.mapping.base import Mapper
-from avn.mapping.occupancy_map import OccupancyMap
+from avn.mapping.occupancy_map import CERTAIN, OccupancyMap
+from avn.mapping.pose import turned
+from avn.navigation.actions import HEADINGS
 from avn.planning.partial_graph import GraphRules, PartialGraph
+
+if TYPE_CHECKING:
+    from avn.navigation.simulator import Simulator
 
 
 class OccupancyMapper(Mapper):
@@ -31,6 +38,21 @@ class OccupancyMapper(Mapper):
         self.graph = PartialGraph(n, self.size, rules)
         self.graph.walls = self.map.walls.numpy()
         self._last = torch.zeros(n, 3, dtype=torch.int64)
+
+    def reveal(self, part: str, simulator: Simulator) -> None:
+        """Take in the true map, as seen from each start."""
+        if part != "map":
+            super().reveal(part, simulator)
+        lattice = torch.from_numpy(simulator.place.grid.lattice).long()
+        start, heading = simulator.start // HEADINGS, simulator.start % HEADINGS
+        away = lattice[None] - lattice[start][:, None]
+        squares = turned(away, -heading % HEADINGS)
+        inside = (squares.abs() <= self.map.centre).all(dim=-1)
+        squares = torch.where(inside[..., None], squares, 0)
+        self.map.log_odds.fill_(-CERTAIN)
+        self.map.log_odds.flatten(1).scatter_(1, self.map.flat(squares), CERTAIN)
+        every = torch.arange(self.size**2).expand(len(start), -1)
+        self.graph.set(every, self.map.belief.flatten(1))
 
     def observe(self, observation: TensorDict, way: Tensor) -> None:
         """Locate the agents by odometry and take in what they see and ran into."""

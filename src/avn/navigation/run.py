@@ -87,8 +87,6 @@ def walk(agent: Agent, simulator: Simulator) -> None:
     episodes = simulator.episodes
     generator = torch.Generator().manual_seed(derive("agent", episodes.seed, episodes.room) >> 1)
     agent.reset(len(simulator), generator, simulator.protocol)
-    if agent.privileged:
-        agent.reveal(simulator)
     if agent.explores:
         if not len(episodes.walks):
             raise UserError(
@@ -96,9 +94,12 @@ def walk(agent: Agent, simulator: Simulator) -> None:
                 "no exploration walk; take episodes=frozen and protocol.exploration=400"
             )
         agent.explore(*simulator.explored())
+    if agent.privileged:
+        agent.reveal(simulator)
     with torch.inference_mode():
         while not bool(simulator.done.all()):
             observation = simulator.step(agent.act(observation))
+            agent.rest(simulator.done)
 
 
 def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:

@@ -87,7 +87,9 @@ class Simulator:
         self._sights = dict(sights or {})
         for name, seen in self._sights.items():
             if len(seen) != len(self.transitions):
-                raise ValueError(f"'{name}' has {len(seen)} rows for {len(self.transitions)} states")
+                raise ValueError(
+                    f"'{name}' has {len(seen)} rows for {len(self.transitions)} states"
+                )
         self.reset()
 
     def __len__(self) -> int:
@@ -149,17 +151,13 @@ class Simulator:
         Returns
         -------
         TensorDict of batch size N
-            `running` (N,) bool, whether the episode goes on; `collided` (N,) bool, whether the
-            last action was a blocked move; `odometry` (N, 3) int64, cells to the right and to the
-            front and quarter turns clockwise since the start, in the frame of the start; with
-            hearing what is heard, and with sights what is seen, by name.
+            `collided` (N,) bool, whether the last action was a blocked move; `odometry` (N, 3)
+            int64, cells to the right and to the front and quarter turns clockwise since the start,
+            in the frame of the start; with hearing what is heard, and with sights what is seen, by
+            name.
         """
         odometry = self._seen_from[self._frame + self.state] - self._origin
-        observation = {
-            "running": ~self.done,
-            "collided": self._collided.clone(),
-            "odometry": odometry,
-        }
+        observation = {"collided": self._collided.clone(), "odometry": odometry}
         if self._hearing:
             clip = self._clip()
             observation |= {name: heard[clip] for name, heard in self._hearing.items()}

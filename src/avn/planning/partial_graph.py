@@ -1,7 +1,7 @@
 """The partial graph: what N agents know of the squares round them, as nodes and edges.
 
-The nodes are squares of a map, and an edge joins neighbours. Squares of which nothing is known count as
-free; one that is found blocked loses its node, and with it its edges.
+The nodes are squares of a map, and an edge joins neighbours. Squares of which nothing is known
+count as free; one that is found blocked loses its node, and with it its edges.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.navigation.actions import BACKWARD, FORWARD, ROTATE_LEFT, ROTATE_RIGHT
+from avn.navigation.actions import BACKWARD, FORWARD, ROTATE_LEFT
 
 NO_ACTION = -1
 _EMPTY = np.inf
@@ -30,6 +30,7 @@ def first_actions(
     turn: float,
     back: float,
     running: NDArray[np.bool_],
+    reach: int = 0,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """The first action of each agent's shortest path to its target.
 
@@ -54,6 +55,8 @@ def first_actions(
         What a step backward costs more than one forward; infinite for none.
     running : (N,) bool
         Whose action is asked for.
+    reach : int
+        A path may end so many squares from its target, diagonals included.
 
     Returns
     -------
@@ -73,8 +76,9 @@ def first_actions(
     touched = np.empty(size * size * 4, dtype=np.int64)
     for n in range(count):
         if running[n]:
+            how = (turn, back, reach)
             action[n], length[n], reached, used = _search(
-                cost[n], walls[n], pose[n], target[n], aim[n], turn, back, best, first, touched
+                cost[n], walls[n], pose[n], target[n], aim[n], how, best, first, touched
             )
             end[n, 0], end[n, 1] = reached % size, reached // size
             for i in range(used):
@@ -83,12 +87,13 @@ def first_actions(
 
 
 @numba.njit(cache=True)
-def _search(cost, walls, pose, target, aim, turn, back, best, first, touched):  # type: ignore[no-untyped-def]
+def _search(cost, walls, pose, target, aim, how, best, first, touched):  # type: ignore[no-untyped-def]
+    turn, back, reach = how
     size = cost.shape[0]
     start = (pose[1] * size + pose[0]) * 4 + pose[2]
     best[start], first[start] = 0.0, NO_ACTION
     touched[0], used = start, 1
-    heap = [(_bound(pose[0], pose[1], target), 0.0, start)]
+    heap = [(_bound(pose[0], pose[1], target, reach), 0.0, start)]
     nearest, found, found_length = np.inf, start, 0.0
     while len(heap):
         _, so_far, node = heapq.heappop(heap)
@@ -96,7 +101,7 @@ def _search(cost, walls, pose, target, aim, turn, back, best, first, touched):  
             continue
         square, heading = node // 4, node % 4
         x, y = square % size, square // size
-        if x == target[0] and y == target[1]:
+        if abs(x - target[0]) <= reach and abs(y - target[1]) <= reach:
             return first[node], so_far, square, used
         away = (x - aim[0]) ** 2 + (y - aim[1]) ** 2
         if away < nearest:
@@ -125,14 +130,11 @@ def _search(cost, walls, pose, target, aim, turn, back, best, first, touched):  
                 first[after] = move if node == start else first[node]
                 there = after // 4
                 heapq.heappush(
-                    heap, (total + _bound(there % size, there // size, target), total, after)
+                    heap, (total + _bound(there % size, there // size, target, reach), total, after)
                 )
     return first[found], found_length, found // 4, used
 
 
 @numba.njit(cache=True)
-def _bound(x: int, y: int, target: NDArray[np.int64]) -> float:
-    return float(abs(x - target[0]) + abs(y - target[1]))
-
-
-__all__ = ["NO_ACTION", "ROTATE_RIGHT", "first_actions"]
+def _bound(x: int, y: int, target: NDArray[np.int64], reach: int) -> float:
+    return float(max(abs(x - target[0]) - reach, 0) + max(abs(y - target[1]) - reach, 0))

@@ -1,0 +1,168 @@
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from torch import Tensor
+
+from avn.agents.planner_agent import PlannerAgent
+from avn.datamodules.sound import relative_locations
+from avn.errors import UserError
+from avn.mapping.memory_mapper import MemoryMapper
+from avn.mapping.occupancy_mapper import OccupancyMapper
+from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
+from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.protocols import Protocol
+from avn.navigation.run import Labels, walk_room
+from avn.views.window import window_cells
+
+# Two rooms, a wall between them with one doorway, and a dead end on the straight way.
+FLAT = """
+aaaaaaa#bbbbbbbb
+aaaaaaa#bbbbbbbb
+aaaa#####bbbbbbb
+aaaa#aa#bbbbbBbb
+aaaaaaa#bbbbbbbb
+aaaaaaaabbbbbbbb
+aaaaaaa#bbbbbbbb
+"""
+LABELS = Labels("ours", "resonance")
+VAR = Protocol(
+    name="var", goal="box", says_stop=False, path="attempted", moves_factor=2.0, exploration=0
+)
+STOP = Protocol(name="stop", goal="radius", says_stop=True, path="walked", exploration=0)
+
+
+def flat() -> DrawnPlace:
+    return draw("flat", FLAT)
+
+
+def truth(place: DrawnPlace, protocol: Protocol = VAR) -> dict[str, Tensor]:
+    """Hearing that tells the very place of the source, and whether it is within reach."""
+    lattice = torch.from_numpy(place.grid.lattice).long()
+    sources = torch.from_numpy(np.asarray(place.sources)).long()
+    goal = torch.from_numpy(protocol.goal_cells(place.grid, np.asarray(place.sources)))
+    return {
+        "sound": relative_locations(lattice, sources)[:, :, None, None],
+        "reach": goal.repeat_interleave(4, dim=1)[:, :, None, None].float(),
+    }
+
+
+def windows(place: DrawnPlace) -> Tensor:
+    """What cannot see through walls is not needed here: all cells are known."""
+    return torch.from_numpy(window_cells(place.grid) >= 0).float()
+
+
+def looks(place: DrawnPlace) -> Tensor:
+    """Pictures that change smoothly with the place and sharply with the heading."""
+    where = torch.from_numpy(place.grid.centres).float().repeat_interleave(4, dim=0)
+    facing = torch.arange(4).repeat(len(place.grid.centres))
+    generator = torch.Generator().manual_seed(1)
+    waves = torch.randn(2, 128, generator=generator) * 2
+    phase = torch.rand(4, 128, generator=generator) * 6.28
+    return torch.nn.functional.normalize(torch.cos(where @ waves + phase[facing]), dim=1)
+
+
+def run(agent: PlannerAgent, place: DrawnPlace, protocol: Protocol = VAR) -> pd.DataFrame:
+    sights = {"window": windows(place), "feature": looks(place)}
+    if agent.explores:
+        episodes = frozen_episodes(place, ["ring"], protocol, seed=0)
+    else:
+        episodes = exhaustive_episodes(place, ["ring"], protocol, seed=0)
+    return walk_room(agent, place, episodes, protocol, LABELS, truth(place, protocol), sights)
+
+
+@pytest.mark.parametrize("protocol", [VAR, STOP], ids=["var", "stop"])
+@pytest.mark.parametrize("look", ["once", "around"])
+@pytest.mark.parametrize("source", ["newest", "belief"])
+def test_with_true_senses_it_always_arrives(protocol: Protocol, look: str, source: str) -> None:
+    frame = run(PlannerAgent(OccupancyMapper(41), look=look, source=source), flat(), protocol)
+    assert frame["success"].mean() > 0.99
+    assert frame["spl"].mean() > 0.8
+    assert frame["collisions"].sum() == 0
+
+
+def test_shown_the_map_it_walks_the_shortest_way() -> None:
+    blind = run(PlannerAgent(OccupancyMapper(41)), flat())
+    shown = run(PlannerAgent(OccupancyMapper(41), truth=["map"]), flat())
+    assert shown["spl"].mean() == pytest.approx(1.0, abs=0.01)
+    assert blind["spl"].mean() < shown["spl"].mean()
+
+
+def test_around_sees_every_heading_before_it_walks_on() -> None:
+    frame = run(PlannerAgent(OccupancyMapper(41), look="around"), flat())
+    once = run(PlannerAgent(OccupancyMapper(41)), flat())
+    # Three turns more a place at the least, and rotations are free.
+    assert (frame["actions"] - frame["path"]).mean() > 2 * frame["path"].mean()
+    assert (once["actions"] - once["path"]).mean() < once["path"].mean() + 2
+
+
+def test_a_wall_that_it_cannot_see_is_found_by_running_into_it_once() -> None:
+    corridor = draw("corridor", "aaaaaaaa\naaaa#aaa\n####aaaA")
+    blind = {"window": torch.full((4 * corridor.grid.cells, 5, 5), torch.nan)}
+    episodes = exhaustive_episodes(corridor, ["ring"], VAR, seed=0)
+    agent = PlannerAgent(OccupancyMapper(41))
+    frame = walk_room(agent, corridor, episodes, VAR, LABELS, truth(corridor), blind)
+    assert frame["success"].mean() > 0.8
+    assert 0 < frame["collisions"].mean() < 3
+
+
+def test_it_holds_to_a_source_that_it_hears_elsewhere_from_each_side() -> None:
+    # Facing east it hears the source in the west, facing west in the east: it must not turn for
+    # ever.
+    hall = draw("hall", "aaaaaaaaA")
+    sound = torch.tensor([[0.0, -2.0]]).expand(1, 4 * 9, 1, 1, 2)
+    episodes = exhaustive_episodes(hall, ["ring"], VAR, seed=0)
+    agent = PlannerAgent(OccupancyMapper(41))
+    sights = {"window": windows(hall)}
+    frame = walk_room(agent, hall, episodes, VAR, LABELS, {"sound": sound}, sights)
+    assert frame["actions"].max() < 300
+    assert frame["path"].min() > 0
+
+
+def test_it_finds_itself_by_retrieval_and_walks_its_memory() -> None:
+    place = flat()
+    rules = dataclasses.replace(VAR, exploration=150)
+    known = run(PlannerAgent(MemoryMapper(41), detour=4.0), place, rules)
+    lost = run(PlannerAgent(MemoryMapper(41, localisation="retrieval"), detour=4.0), place, rules)
+    true = run(PlannerAgent(MemoryMapper(41), detour=4.0, truth=["pose"]), place, rules)
+    assert true["success"].mean() >= known["success"].mean() - 0.05
+    assert known["success"].mean() > 0.6
+    assert known["spl"].mean() > lost["spl"].mean()
+    assert (known["start_cell"].to_numpy() == lost["start_cell"].to_numpy()).all()
+
+
+def test_without_a_walk_a_memory_is_refused() -> None:
+    place, agent = flat(), PlannerAgent(MemoryMapper(41))
+    episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
+    with pytest.raises(UserError, match="explores first, and these episodes have no exploration"):
+        walk_room(agent, place, episodes, VAR, LABELS, truth(place), {"feature": looks(place)})
+
+
+def test_a_missing_sense_is_named_with_what_makes_it() -> None:
+    place, agent = flat(), PlannerAgent(OccupancyMapper(41))
+    episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
+    with pytest.raises(UserError, match="needs the observation 'window': choose what sees free"):
+        walk_room(agent, place, episodes, VAR, LABELS, truth(place))
+    sights, sound = {"window": windows(place)}, {"sound": truth(place)["sound"]}
+    with pytest.raises(UserError, match="needs the observation 'reach': choose what tells when"):
+        walk_room(
+            agent, place, exhaustive_episodes(place, ["ring"], STOP, 0), STOP, LABELS, sound, sights
+        )
+
+
+def test_settings_that_cannot_work_are_refused() -> None:
+    with pytest.raises(UserError, match=r"look: 'twice' is none of once, around"):
+        PlannerAgent(OccupancyMapper(), look="twice")
+    with pytest.raises(UserError, match=r"agent.truth: 'goal' is none of location, window"):
+        PlannerAgent(OccupancyMapper(), truth=["goal"])
+    with pytest.raises(UserError, match=r"planner.blocked_below: 0.7; give 0 to 0.5"):
+        PlannerAgent(OccupancyMapper(), blocked_below=0.7)
+    with pytest.raises(UserError, match=r"localisation: 'gps' is none of retrieval"):
+        MemoryMapper(localisation="gps")
+
+
+def test_only_who_is_given_the_truth_is_privileged() -> None:
+    assert not PlannerAgent(OccupancyMapper()).privileged
+    assert PlannerAgent(OccupancyMapper(), truth=["window"]).privileged
