@@ -3,10 +3,10 @@
 import pytest
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
-from hydra.utils import instantiate
 
-from avn import cli, config, evaluation, listening, pipeline
+from avn import acting, cli, config, evaluation, listening, pipeline
 from avn.dataset import build
+from avn.errors import UserError
 
 NONE, RUN, HEARD, TRAINED = (), ("run",), ("run", "heard"), ("run", "heard", "trained")
 EVERY = ("run", "heard", "trained", "scenes")
@@ -83,6 +83,48 @@ def test_a_raised_version_makes_anew_what_depends_on_it(
     assert moved(before, hashes(composed())) == set(wanted)
 
 
+@pytest.mark.parametrize(
+    ("override", "changes"),
+    [
+        ("outputs=elsewhere", False),
+        # how it decides is no part of what is learned
+        ("stop_model.criterion=balanced", False),
+        ("stop_model.threshold=0.7", False),
+        ("protocol.starts=5", False),
+        # the boxes of two protocols are the same
+        ("protocol=var_stop", False),
+        ("protocol.radius=2.0", False),
+        ("protocol=stop", True),
+        ("stop_model.positives=0.5", True),
+        ("train_seed=1", True),
+        ("acoustics=diffraction", True),
+        ("microphone.noise_rms=0.1", True),
+    ],
+)
+def test_what_the_stop_classifier_depends_on(composed, override, changes):
+    before, after = composed("stop_model=cnn5"), composed("stop_model=cnn5", override)
+    assert (listening.stop_model_hash(before) != listening.stop_model_hash(after)) == changes
+    assert (listening.stop_hash(before) != listening.stop_hash(after)) == changes
+
+
+def test_a_radius_is_another_goal(composed):
+    one, other = (
+        composed("stop_model=cnn5", "protocol=stop", r) for r in ("seed=0", "protocol.radius=2.0")
+    )
+    assert listening.stop_model_hash(one) != listening.stop_model_hash(other)
+
+
+def test_a_threshold_of_the_config_needs_no_network(composed):
+    assert listening.stop_threshold(composed("stop_model=cnn5", "stop_model.threshold=0.7")) == 0.7
+    with pytest.raises(UserError, match=r"stop_model\.criterion: 'best'"):
+        listening.stop_threshold(composed("stop_model=cnn5", "stop_model.criterion=best"))
+
+
+def test_none_cannot_say_stop(composed):
+    with pytest.raises(UserError, match="stop_model: 'none' cannot say Stop; choose cnn5"):
+        listening.stop_model(composed())
+
+
 def test_sounds_are_told_apart_by_their_order(composed):
     one = composed("sound=[ring,alarm]")
     other = composed("sound=[alarm,ring]")
@@ -94,6 +136,6 @@ def test_sounds_are_told_apart_by_their_order(composed):
 )
 def test_only_rows_that_say_so_are_shown_the_truth(composed, row):
     cfg = composed(f"agent={row}")
-    agent = instantiate(cfg.baseline)
+    agent = acting.build_agent(cfg)
     assert agent.privileged == cfg.agent.privileged == (row == "oracle")
     assert "sound" not in agent.needs or listening.hears(cfg)

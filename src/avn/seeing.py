@@ -22,7 +22,7 @@ from avn.dataset.scene import Scene
 from avn.errors import UserError
 from avn.learned import Outcome, read_metrics, trained
 from avn.modules.occupancy_cnn import OccupancyCnn
-from avn.modules.window_metrics import window_metrics
+from avn.modules.window_metrics import calibrated, window_metrics
 from avn.progress import progress_bar
 from avn.stages import digest, make_once, stage_folder
 from avn.views.window import visible_cells, window_cells
@@ -135,7 +135,7 @@ def _measure(model: OccupancyCnn, data: ViewData) -> dict[str, Any]:
     with torch.inference_mode():
         for items in torch.arange(len(views)).split(BATCH):
             log_odds = model.log_odds(views.__getitems__(items.tolist())["pictures"])
-            said.append(torch.sigmoid(log_odds[:, 0] / model.temperature[0]))
+            said.append(calibrated(log_odds, model.calibration)[:, 0])
     free, prior = views.free.bool(), data.prior.expand(len(views), -1, -1)
     figures: dict[str, Any] = {"prior": data.prior.tolist()}
     for name, estimate in (("validation", torch.cat(said)), ("prior", prior)):

@@ -31,7 +31,7 @@ class OptimizerConfig:
     weight_decay: float = 1e-2
 
 
-def build_part(config: Any, node: str, **given: Any) -> Any:
+def build_part(config: Any, node: str = "", **given: Any) -> Any:
     """Build a part of a network from its config.
 
     Parameters
@@ -39,20 +39,21 @@ def build_part(config: Any, node: str, **given: Any) -> Any:
     config : config or dict
         With `_target_`.
     node : str
-        Where in the config the part stands, such as `sound_model`.
+        Where in the config the part stands, such as `sound_model`, if it does not say so itself.
     **given
         Further arguments.
 
     Raises
     ------
     UserError
-        The one that the part raised, with the node before it.
+        The one that the part raised, with the node before it if given.
     """
     try:
         return instantiate(config, **given)
     except InstantiationException as error:
         if isinstance(error.__cause__, UserError):
-            raise UserError(f"{node}.{error.__cause__}") from None
+            where = f"{node}." if node else ""
+            raise UserError(f"{where}{error.__cause__}") from None
         raise
 
 

@@ -14,7 +14,7 @@ from torchmetrics import MeanMetric
 from avn.errors import UserError
 from avn.modules.network import SPLITS, Network, OptimizerConfig
 from avn.modules.view_augment import AugmentConfig
-from avn.modules.window_metrics import WindowScores, temperature
+from avn.modules.window_metrics import WindowScores, calibrated, calibration
 from avn.modules.window_net import WindowNetConfig
 from avn.reporting.window_figures import WindowFigures
 from avn.views.camera import CameraConfig
@@ -48,12 +48,12 @@ class OccupancyConfig:
     )
     augment: AugmentConfig = field(default_factory=AugmentConfig)
     schedule: str = "cosine"
-    epochs: int = 8
-    patience: int = 8
+    epochs: int = 5
+    patience: int = 5
     batch: int = 32
     looks: int = 4
     times: int = 4
-    validation_views: int = 600
+    validation_views: int = 500
     mirror: bool = True
     symmetric: bool = True
     visible_only: bool = False
@@ -93,11 +93,12 @@ class OccupancyCnn(Network):
         Weight of the error in depth (Eigen et al., NeurIPS 2014, in inverse metres here), learned
         beside, from the depth images of the training apartments; 0 for none.
     scaled : bool
-        Divides the log-odds by the temperature that fits the validation apartments best after
-        each epoch (Guo et al., "On calibration of modern neural networks", ICML 2017).
+        Whether log-odds get, after each epoch, the factor and the shift that fit the validation
+        apartments best (see `avn.modules.window_metrics.calibration`): a network that learned two
+        apartments is surer of others than it should be, and rooms differ in how full they are.
     """
 
-    temperature: Tensor
+    calibration: Tensor
     node = "mapper.network"
     what = "occupancy network"
     unit = "views"
@@ -110,12 +111,12 @@ class OccupancyCnn(Network):
         optimizer: dict[str, Any],
         augment: dict[str, Any] | None = None,
         schedule: str = "cosine",
-        epochs: int = 8,
-        patience: int = 8,
+        epochs: int = 5,
+        patience: int = 5,
         batch: int = 32,
         looks: int = 4,
         times: int = 4,
-        validation_views: int = 600,
+        validation_views: int = 500,
         mirror: bool = True,
         symmetric: bool = True,
         visible_only: bool = False,
@@ -138,7 +139,7 @@ class OccupancyCnn(Network):
         self.depth_weight, self.scaled = depth_weight, scaled
         built = self.build("net", camera=CameraConfig(**(camera or {})))
         self.net: nn.Module = built.to(memory_format=torch.channels_last)
-        self.register_buffer("temperature", torch.ones(2))
+        self.register_buffer("calibration", torch.tensor(((1.0, 0.0), (1.0, 0.0))))
         self.training_loss = MeanMetric()
         # Plain lists: they take what is already on the CPU and are no part of a checkpoint.
         self.scores = [WindowScores() for _ in SPLITS]
@@ -156,10 +157,10 @@ class OccupancyCnn(Network):
             Probabilities that each cell of the window is free, and that it is visible.
         """
         pictures = views.permute(0, 3, 1, 2).float() / 255
-        return torch.sigmoid(self.log_odds(pictures) / self.temperature[:, None, None])
+        return calibrated(self.log_odds(pictures), self.calibration)
 
     def log_odds(self, pictures: Tensor) -> Tensor:
-        """(N, 3, H, W) pictures, 0 to 1, to (N, 2, 5, 5) log-odds without the temperature."""
+        """(N, 3, H, W) pictures, 0 to 1, to (N, 2, 5, 5) log-odds before calibration."""
         if not self.symmetric or self.training:
             return self._net(pictures)[0]
         straight, mirrored = self._net(torch.cat((pictures, pictures.flip(-1))))[0].chunk(2)
@@ -205,14 +206,14 @@ class OccupancyCnn(Network):
         self.scores[dataloader_idx].update(log_odds, target, visible)
 
     def on_validation_epoch_end(self) -> None:
-        """Fit the temperature; log figures such as `auc/validation/visible`."""
+        """Fit the calibration; log figures such as `auc/validation/visible`."""
         if self.scaled:
             log_odds, free, visible = self.scores[0].answers()
             chosen = visible if self.visible_only else torch.ones_like(visible)
-            self.temperature[0] = temperature(log_odds[:, 0][chosen], free[chosen])
-            self.temperature[1] = temperature(log_odds[:, 1], visible.float())
+            self.calibration[0] = calibration(log_odds[:, 0][chosen], free[chosen])
+            self.calibration[1] = calibration(log_odds[:, 1], visible.float())
         for split, scores in zip(SPLITS, self.scores, strict=True):
-            scores.temperature = self.temperature.cpu().clone()
+            scores.calibration = self.calibration.cpu().clone()
             found = scores.compute()
             scores.reset()
             self.keep({name.replace("/", f"/{split}/", 1): v for name, v in found.items()})

@@ -46,31 +46,41 @@ def window_metrics(probability: Tensor, free: Tensor, visible: Tensor) -> dict[s
     return figures
 
 
-def temperature(log_odds: Tensor, label: Tensor, steps: int = 40) -> Tensor:
-    """The number by which to divide log-odds so that the cross-entropy is least.
+def calibration(log_odds: Tensor, label: Tensor, steps: int = 30) -> Tensor:
+    """Factor and shift of log-odds with which the cross-entropy is least.
 
-    By golden section over its logarithm, between 1/8 and 8.
+    Platt, "Probabilistic outputs for support vector machines" (1999), by Newton's method, with
+    two cells more, one of each kind, for which it says a half, so that it is always finite.
 
     Parameters
     ----------
     log_odds, label : (...) float tensors
+        Labels are 0 or 1.
     steps : int
-        Each makes the interval smaller by 0.62.
+
+    Returns
+    -------
+    (2,) float32 tensor
+        The factor is no less than 0.05.
     """
-    log_odds, label = log_odds.double(), label.double()
-
-    def loss(power: float) -> float:
-        scaled = log_odds / 2**power
-        return float(nn.functional.binary_cross_entropy_with_logits(scaled, label))
-
-    low, high, ratio = -3.0, 3.0, (5**0.5 - 1) / 2
+    said = torch.cat((log_odds.flatten().double(), torch.zeros(2).double()))
+    label = torch.cat((label.flatten().double(), torch.tensor((0.0, 1.0)).double()))
+    inputs = torch.stack((said, torch.ones_like(said)), 1)
+    fitted = torch.tensor((1.0, 0.0), dtype=torch.float64)
     for _ in range(steps):
-        left, right = high - ratio * (high - low), low + ratio * (high - low)
-        if loss(left) < loss(right):
-            high = right
-        else:
-            low = left
-    return torch.tensor(2 ** ((low + high) / 2))
+        found = torch.sigmoid(inputs @ fitted)
+        slope = inputs.T @ (found - label)
+        curvature = (inputs * (found * (1 - found))[:, None]).T @ inputs
+        step = torch.linalg.solve(curvature + 1e-6 * torch.eye(2).double(), slope)
+        fitted = fitted - step.clamp(-1.0, 1.0)
+    fitted[0].clamp_(min=0.05)
+    return fitted.float()
+
+
+def calibrated(log_odds: Tensor, fitted: Tensor) -> Tensor:
+    """Probabilities (N, 2, 5, 5) of log-odds, with a factor and a shift (2, 2) of either kind."""
+    factor, shift = fitted[:, :, None, None].unbind(1)
+    return torch.sigmoid(log_odds * factor + shift)
 
 
 class WindowScores(Metric):
@@ -78,8 +88,8 @@ class WindowScores(Metric):
 
     Attributes
     ----------
-    temperature : (2,) tensor
-        By which log-odds of free and of visible are divided.
+    calibration : (2, 2) tensor
+        Factor and shift of the log-odds of free and of visible; see `calibrated`.
     """
 
     full_state_update = False
@@ -88,7 +98,7 @@ class WindowScores(Metric):
         super().__init__()
         for state in ("log_odds", "free", "visible"):
             self.add_state(state, default=[], dist_reduce_fx="cat")
-        self.temperature = torch.ones(2)
+        self.calibration = torch.tensor(((1.0, 0.0), (1.0, 0.0)))
 
     def update(self, log_odds: Tensor, free: Tensor, visible: Tensor) -> None:
         """Take in N windows.
@@ -113,7 +123,7 @@ class WindowScores(Metric):
     def compute(self) -> dict[str, float]:
         """Those of `window_metrics`, and `auc/sight` of the estimates of what is visible."""
         log_odds, free, visible = self.answers()
-        said = torch.sigmoid(log_odds / self.temperature[:, None, None])
+        said = calibrated(log_odds, self.calibration)
         figures = window_metrics(said[:, 0], free.bool(), visible)
         figures["auc/sight"] = float(binary_auroc(said[:, 1].flatten(), visible.int().flatten()))
         return figures

@@ -1,0 +1,76 @@
+"""The sizes of the occupancy network in the code that the paper's authors released."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from torch import Tensor, nn
+
+from avn.errors import UserError
+from avn.views.camera import CameraConfig
+from avn.views.window import WINDOW
+
+OUTPUTS = 2
+
+
+class ReleasedWindowNet(nn.Module):
+    """Four convolutions, a layer of 200, three transposed convolutions, dense layers, a window.
+
+    Sizes are those of the code released with Gan et al., "Look, Listen, and Act" (ICRA 2020).
+    What it leaves open is chosen here: strides of 2, an adaptive pool to 4 x 4 before the dense
+    layer, and a second window for what is visible. It has no depth.
+
+    Parameters
+    ----------
+    camera : CameraConfig
+        Of no account here.
+    widths : sequence of 4 int
+        Channels of the convolutions.
+    decoder : int
+        Size of the layer between convolutions and transposed ones.
+    cell : int
+        Size of the last dense layer before the window.
+    dropout : float
+        Share of inputs of the dense layers that training silences.
+    """
+
+    def __init__(
+        self,
+        camera: CameraConfig,
+        widths: Sequence[int] = (32, 48, 64, 64),
+        decoder: int = 200,
+        cell: int = 1000,
+        dropout: float = 0.0,
+    ) -> None:
+        super().__init__()
+        if len(widths) != 4 or min([*widths, decoder, cell]) < 1:
+            raise UserError("net: widths are four numbers; these, decoder and cell 1 or more each")
+        layers: list[nn.Module] = []
+        before = 3
+        for width, size in zip(widths, (7, 7, 5, 5), strict=True):
+            layers += [nn.Conv2d(before, width, size, 2, padding=size // 2), nn.ReLU()]
+            before = width
+        layers += [
+            nn.AdaptiveAvgPool2d(4),
+            nn.Flatten(),
+            nn.Linear(before * 16, decoder),
+            nn.ReLU(),
+        ]
+        layers += [nn.Unflatten(1, (decoder, 1, 1))]
+        before = decoder
+        for width in (64, 32, 1):
+            layers += [nn.ConvTranspose2d(before, width, 7), nn.ReLU()]
+            before = width
+        layers += [nn.Flatten()]
+        size = 19 * 19
+        for wide in (4096, cell):
+            layers += [nn.Dropout(dropout), nn.Linear(size, wide), nn.ReLU()]
+            size = wide
+        layers += [nn.Linear(size, OUTPUTS * WINDOW * WINDOW)]
+        layers += [nn.Unflatten(1, (OUTPUTS, WINDOW, WINDOW))]
+        self.layers = nn.Sequential(*layers)
+
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """(N, 3, size, size) pictures to (N, 2, 5, 5) log-odds, and no depth."""
+        log_odds = self.layers(pictures)
+        return log_odds, log_odds.new_zeros(())
