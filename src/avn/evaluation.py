@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 from hydra.utils import instantiate
@@ -14,7 +13,6 @@ from torch.utils.tensorboard import SummaryWriter
 
 from avn import listening, pipeline, senses
 from avn.acoustics.dry_sounds import content_hash, load_sounds
-from avn.agents.base import Agent
 from avn.acting import acting, build_agent
 from avn.dataset import build
 from avn.dataset.scene import Scene

@@ -59,8 +59,8 @@ def seen(cfg: DictConfig, rooms: Sequence[Scene], wanted: Sequence[str]) -> list
     found: list[dict[str, Tensor]] = [{} for _ in rooms]
     if "window" in wanted and "window" in cfg.agent.truth:
         for room, own in zip(rooms, found, strict=True):
-            free, visible = seeing.true_windows(cfg, room)
-            own["window"] = torch.where(visible, free.float(), torch.nan)
+            free, seen_there = seeing.true_windows(cfg, room)
+            own["window"] = torch.where(seen_there, free.float(), torch.nan)
     elif "window" in wanted and seeing.sees_windows(cfg):
         windows, visible = seeing.windows(cfg, rooms), seeing.sights(cfg, rooms)
         for own, said, sight in zip(found, windows, visible, strict=True):
