@@ -1,4 +1,4 @@
-"""`python -m avn.generate`: builds the apartments of a split and their sound."""
+"""`python -m avn.generate`: builds the apartments of a split, their sound and their views."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from avn.acoustics.dry_sounds import load_sounds
 from avn.cli import command
 from avn.dataset.scene import Scene
 from avn.errors import UserError
+from avn.reporting.contact_sheet import save_contact_sheet
 from avn.reporting.floor_plan_figure import save_floor_plan
 from avn.stages import tell
 
@@ -23,16 +24,22 @@ EXPORTS = ("wav",)
 
 @command("generate")
 def main(cfg: DictConfig) -> Path:
-    """Make all scenes of the split, draw their floor plans, and export what is asked for."""
+    """Make all scenes of the split, draw plans and contact sheets, and export what is asked for."""
     if cfg.export is not None and cfg.export not in EXPORTS:
         raise UserError(f"export: '{cfg.export}' is none of {', '.join(EXPORTS)}")
     if cfg.export is None and (cfg.clips or cfg.apartments):
         raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
     parts = [part for part, found in pipeline.plans(cfg).items() if found]
     opened = pipeline.scenes(cfg, parts, audible=True, asked=True)
+    pipeline.seen_scenes(cfg, parts, asked=True)
+    hashes = pipeline.views_hashes(cfg, parts)
     every = [which for part in parts for which in opened[part]]
-    for which in every:
+    made = [own for part in parts for own in hashes[part]]
+    for which, made_from in zip(every, made, strict=True):
         save_floor_plan(which.plan, which.folder / "floor_plan.png", which.grid)
+        sheet = which.folder / f"contact_sheet-{cfg.renderer.name}.png"
+        views = which.views(cfg.renderer.name, made_from)
+        save_contact_sheet(which.plan, which.grid, views.rgb, sheet)
         _report(cfg, which)
     if cfg.export == "wav":
         _export(cfg, _chosen(cfg, every))
