@@ -150,3 +150,14 @@ def test_a_sheet_close_under_another_does_not_darken_it():
         light, points = baked(mesh, 0.5, lamp((0.25, 0.25, 2.0), 1.0), NO_PANES, cfg)
         top = (mesh.vertices[..., 2] > 0.499).all(axis=1)
         assert light[0][points.corner[top]].min() > 0.2
+
+
+def test_a_sheet_that_is_a_little_aslant_far_from_the_origin_does_not_darken_another():
+    """Heights are compared along one direction: at 9 m a tilt of 0.01 would count for 9 cm."""
+    upper, lower = floor(0.3, 0.07), floor(0.3, 0.07)
+    upper.vertices[..., 2] = 0.006 + 0.001 * upper.vertices[..., 0]
+    mesh = join((lower, upper))
+    mesh.vertices[...] += np.array((9.0, 5.0, 0.75), np.float32)
+    cfg = LightConfig(spacing=0.07, shadow_rays=4, gather_rays=1, bounces=0)
+    light, points = baked(mesh, 0.5, lamp((9.0, 5.0, 2.3), 1.0), NO_PANES, cfg)
+    assert light[0][points.corner[len(lower) :]].min() > 0.2

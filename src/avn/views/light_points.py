@@ -72,13 +72,14 @@ def choose_points(mesh: Mesh, spacing: float) -> Points:
     """Group triangles that lie within `spacing` and face the same way."""
     normal, area = normals_of(mesh.vertices)
     centre = mesh.vertices.astype(np.float64).mean(axis=1)
-    height = (centre * normal).sum(axis=1)
     facing = np.rint(normal * 2).astype(np.int64)
+    # along what they have in common, or the least tilt would count with the distance to the origin
+    height = (centre * facing).sum(axis=1) / np.linalg.norm(facing, axis=1)
     voxel = np.floor(centre / spacing).astype(np.int64)
     # two faces of a board are apart by its thickness only
     layer = np.floor(height / 0.01 + 0.5).astype(np.int64)
     _, number = _numbered(*voxel.T, *facing.T, layer)
-    outer, inmost = (_first(number, np.rint(sign * height / 0.002), area) for sign in (-1, 1))
+    outer, inmost = (_first(number, np.rint(sign * height / 0.0002), area) for sign in (-1, 1))
     front = number.astype(np.int32)
     inner = mesh.piece != BUILDING
     sides, back_of = np.unique(number[inner], return_inverse=True)
