@@ -1,0 +1,136 @@
+"""The paper's two rows on the real pipeline, with the mini split and small pictures."""
+
+from pathlib import Path
+
+import h5py
+import pandas as pd
+import pytest
+
+SMALL = (
+    "split=mini",
+    "processes=1",
+    "acoustics.rays=300",
+    "acoustics.seconds=0.2",
+    "sound_model.epochs=1",
+    "stop_model.epochs=1",
+    "takes=1",
+    "protocol.starts=4",
+    "renderer.camera.size=32",
+    "renderer.samples=1",
+    "renderer.light.gather_rays=4",
+    "renderer.light.shadow_rays=2",
+    "renderer.light.spacing=0.3",
+    "backbone.size=32",
+    "sound=alarm",
+)
+EYES = (
+    "mapper.network.epochs=1",
+    "mapper.network.looks=1",
+    "mapper.network.times=1",
+    "mapper.network.validation_views=40",
+)
+
+
+def ours(command, outputs, *more):
+    eyes = () if "agent=ours_exp" in more else EYES
+    return command("eval", *SMALL, *eyes, f"outputs={outputs}", *more)
+
+
+def records(out):
+    return pd.read_csv(Path(out[-1]) / "episodes.csv")
+
+
+@pytest.mark.parametrize("protocol", ["var", "stop"])
+def test_it_sees_hears_maps_and_walks(command, outputs, protocol):
+    code, out, err = ours(command, outputs, "agent=ours_noexp", f"protocol={protocol}")
+    assert code == 0, err
+    episodes = records(out)
+    assert set(episodes["look"]) == {"once"}
+    assert set(episodes["agent"]) == {"ours_noexp"}
+    if protocol == "stop":
+        # Whatever its network is worth after one epoch: who did not say Stop ran out of actions.
+        assert set(episodes["outcome"]) <= {"success", "stopped_elsewhere", "out_of_actions"}
+
+
+def test_a_run_made_again_has_the_same_bytes(command, outputs):
+    _, out, _ = ours(command, outputs, "agent=ours_noexp")
+    first = (Path(out[-1]) / "episodes.csv").read_bytes()
+    for name in ("episodes.csv", "results.csv"):
+        (Path(out[-1]) / name).unlink()
+    _, out, _ = ours(command, outputs, "agent=ours_noexp")
+    assert (Path(out[-1]) / "episodes.csv").read_bytes() == first
+
+
+@pytest.mark.parametrize("localisation", ["retrieval", "retrieval+odometry"])
+@pytest.mark.parametrize("exploration", ["shared", "own"])
+def test_it_explores_and_finds_itself(command, outputs, localisation, exploration):
+    options = (f"localisation={localisation}", f"exploration={exploration}")
+    code, out, err = ours(command, outputs, "agent=ours_exp", *options)
+    assert code == 0, err
+    assert len(records(out)) == 2 * 4
+
+
+def test_the_truth_in_place_of_a_part_makes_a_bound_of_it(command, outputs):
+    refused, _, err = ours(command, outputs, "agent=ours_noexp", "agent.truth=[location,window]")
+    assert refused == 2
+    assert "agent.privileged: False, but 'PlannerAgent' is shown the truth" in err[-1]
+    code, out, err = ours(
+        command,
+        outputs,
+        "agent=ours_noexp",
+        "agent.truth=[location,window]",
+        "agent.privileged=true",
+    )
+    assert code == 0, err
+    episodes = records(out)
+    assert set(episodes["agent"]) == {"ours_noexp-true-location-true-window"}
+    assert episodes["success"].mean() > 0.8
+
+
+def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
+    _, out, _ = ours(command, outputs, "agent=ours_noexp", "part=validation")
+    assert set(records(out)["room"]) == {"val_1"}
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("agent=ours_noexp", "mapper=none"), "mapper: 'none' remembers nothing to plan on"),
+        (("agent=ours_noexp", "look=twice"), "look: 'twice' is none of once, around"),
+        (("agent=ours_noexp", "part=all"), "part: 'all' is none of train, validation, test"),
+        (("agent=ours_noexp", "baseline=greedy"), "cannot both act"),
+        (("agent=greedy", "agent.truth=[map]"), "agent.truth: only agents that plan"),
+        (("agent=ours_exp", "localisation=gps"), "localisation: 'gps' is none of retrieval"),
+        (("agent=ours_exp", "episodes=exhaustive"), "have no exploration walk"),
+        (("agent=ours_exp", "exploration=some"), "exploration: 'some' is none of shared, own"),
+        (("agent=ours_exp", "mapper.windows=true"), "needs the observation 'window'"),
+        (("agent=ours_noexp", "planner.source=last"), "planner.source: 'last' is none of newest"),
+    ],
+)
+def test_a_mistake_is_one_line(command, outputs, options, said):
+    more = tuple(option for option in SMALL if not option.startswith("sound="))
+    eyes = EYES if "agent=ours_noexp" in options and "mapper=none" not in options else ()
+    code, _, err = command("eval", *more, *eyes, "sound=alarm", f"outputs={outputs}", *options)
+    assert code == 2
+    assert said in err[-1]
+    assert "Traceback" not in "".join(err)
+
+
+def test_views_that_are_missing_are_refused_with_auto_false(command, tmp_path):
+    code, _, err = command("eval", *SMALL, "agent=ours_exp", f"outputs={tmp_path}", "auto=false")
+    assert code == 2
+    assert "is missing and auto=false" in err[-1]
+
+
+def test_damaged_features_are_one_line(command, outputs):
+    _, out, _ = ours(command, outputs, "agent=ours_exp")
+    path = next(outputs.glob("generate/mini-*/room_1/features-*.h5"))
+    whole = path.read_bytes()
+    try:
+        with h5py.File(path, "r+") as file:
+            file["features"][0, 0] += 1
+        code, _, err = ours(command, outputs, "agent=ours_exp", "seed=5")
+        assert code == 2
+        assert f"{path}: changed since it was written" in err[-1]
+    finally:
+        path.write_bytes(whole)
