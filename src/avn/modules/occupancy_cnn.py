@@ -51,7 +51,7 @@ class OccupancyConfig:
     epochs: int = 5
     patience: int = 5
     batch: int = 32
-    looks: int = 4
+    looks: int = 2
     times: int = 4
     validation_views: int = 500
     mirror: bool = True
@@ -114,7 +114,7 @@ class OccupancyCnn(Network):
         epochs: int = 5,
         patience: int = 5,
         batch: int = 32,
-        looks: int = 4,
+        looks: int = 2,
         times: int = 4,
         validation_views: int = 500,
         mirror: bool = True,
