@@ -31,7 +31,7 @@ def composed():
         ("sound_model=cnn5", False),
         ("acoustics=diffraction", False),
         ("mapper.network.epochs=3", True),
-        ("mapper.network.looks=2", True),
+        ("mapper.network.looks=3", True),
         ("mapper.network.augment.colour=0.5", True),
         ("train_seed=2", True),
         ("renderer.camera.pitch=-20", True),

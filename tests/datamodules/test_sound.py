@@ -3,7 +3,8 @@ import torch
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
 from avn.acoustics.clips import MicrophoneConfig
-from avn.datamodules.sound import ClipSet, FreshTakes, SoundData, relative_locations
+from avn.datamodules.fresh_takes import FreshTakes
+from avn.datamodules.sound import ClipSet, SoundData, relative_locations
 from avn.errors import UserError
 from avn.modules.sound_cnn import SoundModelConfig
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,6 +14,7 @@ from torch.utils.data import Dataset, Sampler
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
 from avn.apartments.floor_plan import CELL
 from avn.datamodules.ahead import AheadLoader
+from avn.datamodules.fresh_takes import FreshTakes
 from avn.dataset.scene import Brirs, Scene
 from avn.errors import UserError
 from avn.modules.listener import ClipBatch, PictureBatch
@@ -193,41 +194,6 @@ class PictureSet(Dataset[PictureBatch]):
             in_sight=batch["in_sight"],
             sound=batch["sound"],
         )
-
-
-class FreshTakes(Sampler[int]):
-    """The items of a training epoch in a random order: every pair, each time in another take.
-
-    The order is drawn from the seed and the epoch alone, so that a resumed training sees what
-    an uninterrupted one would have seen.
-
-    Parameters
-    ----------
-    clips : ClipSet
-    seed : int
-    sounds_per_pair : int
-        How many of the sounds a pair is heard with in one epoch.
-    """
-
-    def __init__(self, clips: ClipSet, seed: int, sounds_per_pair: int) -> None:
-        self.clips, self.seed, self.sounds_per_pair = clips, seed, sounds_per_pair
-        self.epoch = 0
-
-    def set_epoch(self, epoch: int) -> None:
-        """Called by the trainer before each epoch."""
-        self.epoch = epoch
-
-    def __len__(self) -> int:
-        return self.clips.pairs * self.sounds_per_pair
-
-    def __iter__(self) -> Iterator[int]:
-        generator = torch.Generator().manual_seed(self.seed * 1_000_003 + self.epoch)
-        sounds = len(self.clips.sounds.names)
-        ranks = torch.rand(self.clips.pairs, sounds, generator=generator).argsort(1)
-        chosen = ranks[:, : self.sounds_per_pair].flatten()
-        pairs = torch.arange(self.clips.pairs).repeat_interleave(self.sounds_per_pair)
-        items = self.clips.item(pairs, chosen, self.epoch)
-        yield from items[torch.randperm(len(items), generator=generator)].tolist()
 
 
 class SoundData(L.LightningDataModule):
