@@ -123,7 +123,7 @@ def test_views_that_are_missing_are_refused_with_auto_false(command, tmp_path):
 
 
 def test_damaged_features_are_one_line(command, outputs):
-    _, out, _ = ours(command, outputs, "agent=ours_exp")
+    ours(command, outputs, "agent=ours_exp")
     path = next(outputs.glob("generate/mini-*/room_1/features-*.h5"))
     whole = path.read_bytes()
     try:
