@@ -2,9 +2,9 @@
 
 Peers, each used where it is installed: pybullet's TinyRenderer, a rasteriser on one thread that
 draws the same triangles in plain colours with shadows of one lamp, and Blender's Cycles, which
-follows the light of the same scene (`renderer=cycles`). Ours counts the baking of light once an
-apartment, spread over its views. All run on one thread of this process and report its processor
-time.
+follows the light of the same scene (`renderer=cycles`). The apartment is the first of the training
+apartments of `var`. Ours counts the baking of light once an apartment, spread over its views. All
+run on one thread of this process and report its processor time.
 
 Run from the repository: ``python benchmarks/views.py``.
 """
@@ -21,6 +21,7 @@ import numpy as np
 
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
+from avn.apartments.splits import SplitConfig, load_split
 from avn.views.cycles import Cycles, CyclesConfig
 from avn.views.raycast import Raycast, RaycastConfig
 from avn.views.scenery import scenery
@@ -92,10 +93,9 @@ def run_pybullet(plan, centres, headings):
 def main():
     """Print seconds a view and ratios."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seed", type=int, default=5, help="of the apartment")
     parser.add_argument("--views", type=int, default=48, help="views that are timed")
     arguments = parser.parse_args()
-    plan = generate(arguments.seed, "home", sources=5, size="mixed")
+    plan = load_split(SplitConfig(folder="var"))["train"][0]
     grid = build_grid(plan)
     states = np.linspace(0, 4 * grid.cells - 1, arguments.views).astype(int)
     centres, headings = grid.centres[states // 4], states % 4
