@@ -23,6 +23,7 @@ from avn.modules.sound_cnn import SoundModelConfig
 from avn.modules.stop_classifier import StopModelConfig
 from avn.navigation.protocols import ProtocolConfig
 from avn.views.backbone import BackboneConfig
+from avn.views.cycles import CyclesConfig
 from avn.views.raycast import RaycastConfig
 from avn.views.renderer import RendererConfig
 
@@ -125,6 +126,7 @@ SCHEMAS = {
     ("protocol", "schema"): ProtocolConfig,
     ("renderer", "schema"): RendererConfig,
     ("renderer", "raycast_schema"): RaycastConfig,
+    ("renderer", "cycles_schema"): CyclesConfig,
     ("backbone", "schema"): BackboneConfig,
     ("mapper", "schema"): MapperConfig,
     ("mapper", "memory_schema"): MemoryConfig,
