@@ -21,6 +21,12 @@ SMALL = (
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
     "takes=1",
+    # as in test_planner_commands.py, for views of other settings in one folder are refused
+    "renderer.camera.size=32",
+    "renderer.samples=1",
+    "renderer.light.gather_rays=4",
+    "renderer.light.shadow_rays=2",
+    "renderer.light.spacing=0.3",
 )
 
 
