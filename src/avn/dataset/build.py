@@ -6,13 +6,10 @@ so that a killed run goes on where it was.
 
 from __future__ import annotations
 
-import multiprocessing
 import shutil
 from collections.abc import Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -27,6 +24,7 @@ from avn.apartments.sight import line_of_sight
 from avn.apartments.surfaces import build_surfaces
 from avn.apartments.walls import walls
 from avn.dataset import scene, scene_file
+from avn.dataset.processes import in_processes
 from avn.dataset.scene import Scene
 from avn.errors import UserError
 from avn.progress import progress_bar
@@ -167,28 +165,13 @@ def build_acoustics(scenes: Sequence[Scene], acoustics: AcousticsConfig, process
     if total:
         with progress_bar("tracing sound", total, "pairs") as advance:
             advance(total - sum(len(job.cells) for job in todo))
-            for done in _in_processes(todo, processes):
+            for done in in_processes(_render_tail, todo, processes):
                 advance(done)
     for which in missing:
         _assemble_tail(which, acoustics, jobs[which.name])
     for which in scenes:
         if not _first_made(which, acoustics):
             _write_first_arrivals(which, acoustics)
-
-
-def _in_processes(jobs: list[_Job], processes: int) -> Any:
-    if processes <= 1 or len(jobs) <= 1:
-        yield from map(_render_tail, jobs)
-        return
-    context = multiprocessing.get_context("spawn")  # a forked child would inherit torch's threads
-    with ProcessPoolExecutor(min(processes, len(jobs)), mp_context=context) as pool:
-        futures: list[Future[int]] = [pool.submit(_render_tail, job) for job in jobs]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
 
 
 def _jobs(which: Scene, acoustics: AcousticsConfig) -> list[_Job]:
