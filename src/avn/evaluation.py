@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -21,7 +21,7 @@ from avn.modules.hearing import sound_errors
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
 from avn.navigation.exploration import EXPLORATIONS
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk_room
+from avn.navigation.run import Labels, Watch, walk_room
 from avn.reporting import results, table
 from avn.stages import check_name, digest, make_once, written_whole
 
@@ -35,13 +35,14 @@ def run_hash(cfg: DictConfig) -> str:
     """Hash of what a run's records depend on."""
     acoustics = pipeline.acoustics_of(cfg)
     apartments = [build.first_arrival_hash(p, acoustics) for p in pipeline.plans(cfg)[cfg.part]]
-    observed = senses.senses_hash(cfg, _wanted(cfg))
+    observed = senses.senses_hash(cfg, wanted_by(cfg))
     rules = (cfg.protocol, cfg.agent, cfg.seed, cfg.episodes, cfg.exploration)
     sounds = list(content_hash(listening.sound_files(cfg)).items())
     return digest(apartments, observed, rules, acting(cfg), sounds, VERSION)
 
 
-def _wanted(cfg: DictConfig) -> tuple[str, ...]:
+def wanted_by(cfg: DictConfig) -> tuple[str, ...]:
+    """The observations that the agent of a config cannot do without."""
     return build_agent(cfg).wants(instantiate(cfg.protocol))
 
 
@@ -73,7 +74,7 @@ def evaluate(cfg: DictConfig) -> Path:
         raise UserError(f"part: '{cfg.part}' is none of {', '.join(pipeline.PARTS)}")
     if cfg.exploration not in EXPLORATIONS:
         raise UserError(f"exploration: '{cfg.exploration}' is none of {', '.join(EXPLORATIONS)}")
-    protocol: Protocol = instantiate(cfg.protocol)
+    instantiate(cfg.protocol)  # rules that contradict themselves are refused first
     agent = build_agent(cfg)
     if agent.privileged != cfg.agent.privileged:
         raise UserError(
@@ -86,34 +87,61 @@ def evaluate(cfg: DictConfig) -> Path:
         folder,
         f"run of '{cfg.agent.name}' with seed {cfg.seed}",
         done=(folder / RESULTS).is_file,
-        make=lambda: _walk(cfg, protocol, folder),
+        make=lambda: _walk(cfg, folder),
     )
     return folder
 
 
-def _walk(cfg: DictConfig, protocol: Protocol, folder: Path) -> None:
+def _walk(cfg: DictConfig, folder: Path) -> None:
     rooms = pipeline.scenes(cfg, (cfg.part,))[cfg.part]
-    wanted = _wanted(cfg)
+    wanted = wanted_by(cfg)
     hearing, sights = senses.heard(cfg, rooms, wanted), senses.seen(cfg, rooms, wanted)
     if "sound" in wanted and listening.hears(cfg):
         _write_heard(cfg, rooms, [own["sound"] for own in hearing], folder)
-    agent = build_agent(cfg, ready=True)
-    labels = Labels(
-        agent="-true-".join((cfg.agent.name, *cfg.agent.truth)),
-        acoustics=cfg.acoustics.name,
-        look=cfg.look if cfg.planner._target_ else "once",
-    )
-    walked = [
-        walk_room(agent, room, episodes_of(cfg, room, protocol), protocol, labels, heard, seen)
-        for room, heard, seen in zip(rooms, hearing, sights, strict=True)
-    ]
-    episodes = pd.concat(walked, ignore_index=True)
+    episodes = pd.concat(walk_rooms(cfg, rooms, hearing, sights), ignore_index=True)
     summary = results.summarise(episodes)
     _log(cfg, folder, summary)
     with written_whole(folder / "config.yaml") as part:
         OmegaConf.save(cfg, part, resolve=True)
     results.write_csv(episodes, folder / EPISODE_RECORDS)
     results.write_csv(summary, folder / RESULTS)
+
+
+def walk_rooms(
+    cfg: DictConfig,
+    rooms: Sequence[Scene],
+    hearing: Sequence[Mapping[str, Tensor]],
+    sights: Sequence[Mapping[str, Tensor]],
+    watch: Watch | None = None,
+) -> list[pd.DataFrame]:
+    """Let the agent of a config walk all episodes of some rooms.
+
+    Parameters
+    ----------
+    rooms : sequence of Scene
+    hearing, sights : sequences of mappings of str to tensor
+        What is heard and seen in each; see `avn.senses`.
+    watch : callable, optional
+        Looks on; see `avn.navigation.run.Watch`.
+
+    Returns
+    -------
+    list of DataFrame
+        The records of each room.
+    """
+    protocol: Protocol = instantiate(cfg.protocol)
+    agent = build_agent(cfg, ready=True)
+    labels = Labels(
+        agent="-true-".join((cfg.agent.name, *cfg.agent.truth)),
+        acoustics=cfg.acoustics.name,
+        look=cfg.look if cfg.planner._target_ else "once",
+    )
+    return [
+        walk_room(
+            agent, room, episodes_of(cfg, room, protocol), protocol, labels, heard, seen, watch
+        )
+        for room, heard, seen in zip(rooms, hearing, sights, strict=True)
+    ]
 
 
 def _write_heard(

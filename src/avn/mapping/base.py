@@ -30,6 +30,10 @@ class Mapper(ABC):
         Column and row before they are rounded to a square.
     graph : PartialGraph
         Nodes and edges that the planner plans on.
+    in_walk : bool
+        Whether the map lies in the frame of the exploration walk, not in that of the start.
+    retrieved : (N, k) float32 and (N, k, 3) int64 tensors, or None
+        What a memory returned last, for pictures: cosines and places in the frame of the walk.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
@@ -37,10 +41,26 @@ class Mapper(ABC):
     pose: Tensor
     location: Tensor
     graph: PartialGraph
+    in_walk: bool = False
+    retrieved: tuple[Tensor, Tensor] | None = None
 
     @abstractmethod
     def reset(self, n: int, rules: GraphRules) -> None:
         """Begin N new episodes, of which nothing is known."""
+
+    def belief(self, rows: Tensor) -> Tensor | None:
+        """Probability that each square of some agents' maps is free, for pictures.
+
+        Parameters
+        ----------
+        rows : (R,) int64 tensor
+
+        Returns
+        -------
+        (R, M, M) float32 tensor, or None
+            By square to the front and to the right; None where it has no such map.
+        """
+        return None
 
     def explore(self, walks: TensorDict, walk: Tensor) -> None:
         """Remember exploration walks.

@@ -69,6 +69,7 @@ class MemoryMapper(Mapper):
         if not (sharpness > 0 and confidence > 0):
             raise UserError("mapper.sharpness and mapper.confidence are over 0")
         self.size, self.top, self.localisation = size, top, localisation
+        self.in_walk = localisation == "retrieval"
         self.edges, self.sharpness, self.confidence = edges, sharpness, confidence
         self.windows = windows
         self.needs = ("feature", "window") if windows else ("feature",)  # type: ignore[misc]
@@ -79,6 +80,7 @@ class MemoryMapper(Mapper):
         self.graph = PartialGraph(n, self.size, rules)
         self._last = torch.zeros(n, 3, dtype=torch.int64)
         self._memory: SpatialMemory | None = None
+        self.retrieved = None
 
     def explore(self, walks: TensorDict, walk: Tensor) -> None:
         """Remember the walks: pictures, visited squares and the edges between them."""
@@ -96,6 +98,11 @@ class MemoryMapper(Mapper):
             self._votes = FrameVotes(len(walk), self.size, self.sharpness)
             self._laid = torch.zeros_like(self.map.log_odds)
             self._laid_walls = torch.zeros_like(self.map.walls)
+
+    def belief(self, rows: Tensor) -> Tensor:
+        """What each square is believed to be, (R, M, M): own map and walk together."""
+        own = self.map.log_odds[rows]
+        return torch.sigmoid(own if self.in_walk else self._both(own, self._laid[rows]))
 
     def reveal(self, part: str, simulator: Simulator) -> None:
         """Take in where the walk truly lies in the frame of the start."""
@@ -122,7 +129,7 @@ class MemoryMapper(Mapper):
     def _observe_by_looks(
         self, memory: SpatialMemory, observation: TensorDict, way: Tensor
     ) -> None:
-        similarity, places = memory.recall(observation["feature"])
+        similarity, places = self.retrieved = memory.recall(observation["feature"])
         found = locate(similarity, places)
         pose = found.round().long()
         squares = take_in(self.map, pose, self._last, observation, way, self.windows)
@@ -135,7 +142,7 @@ class MemoryMapper(Mapper):
     ) -> None:
         pose = observation["odometry"]
         squares = take_in(self.map, pose, self._last, observation, way, self.windows)
-        similarity, places = memory.recall(observation["feature"], own=False)
+        similarity, places = self.retrieved = memory.recall(observation["feature"], own=False)
         changed = self._votes.vote(pose, similarity, places, self.confidence)
         wrong = ((self.map.log_odds <= -CERTAIN) & (self._laid >= CERTAIN)).flatten(1).any(dim=1)
         changed |= self._votes.refuse(wrong)
@@ -158,8 +165,11 @@ class MemoryMapper(Mapper):
         """Give squares of some agents the cost of what walk and own map say together."""
         own = self.map.log_odds.flatten(1)[rows[:, None], squares]
         laid = self._laid.flatten(1)[rows[:, None], squares]
-        both = torch.where(own.abs() >= CERTAIN, own, own + laid)
-        self.graph.set(squares, torch.sigmoid(both), rows)
+        self.graph.set(squares, torch.sigmoid(self._both(own, laid)), rows)
+
+    @staticmethod
+    def _both(own: Tensor, laid: Tensor) -> Tensor:
+        return torch.where(own.abs() >= CERTAIN, own, own + laid)
 
     def _lay(self, rows: Tensor) -> None:
         """Lay what the walk knows over the maps of some agents, where they take it to lie."""

@@ -54,6 +54,10 @@ class OccupancyMapper(Mapper):
         every = torch.arange(self.size**2).expand(len(start), -1)
         self.graph.set(every, self.map.belief.flatten(1))
 
+    def belief(self, rows: Tensor) -> Tensor:
+        """What each square is believed to be, (R, M, M)."""
+        return torch.sigmoid(self.map.log_odds[rows])
+
     def observe(self, observation: TensorDict, way: Tensor) -> None:
         """Locate the agents by odometry and take in what they see and ran into."""
         pose = observation["odometry"]

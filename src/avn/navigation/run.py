@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 import torch
+from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
@@ -31,6 +32,11 @@ _MAKERS = {
 }
 
 
+# What looks on at a walk: it is shown simulator and agent, what is observed, and the actions that
+# follow, which are None when all episodes are over.
+Watch = Callable[[Simulator, Agent, TensorDict, Tensor | None], None]
+
+
 @dataclass(frozen=True)
 class Labels:
     """What the records say of a run beside what the simulator knows."""
@@ -48,6 +54,7 @@ def walk_room(
     labels: Labels,
     hearing: Mapping[str, Tensor] | None = None,
     sights: Mapping[str, Tensor] | None = None,
+    watch: Watch | None = None,
 ) -> pd.DataFrame:
     """Let an agent walk all episodes of a room at once.
 
@@ -58,6 +65,8 @@ def walk_room(
     ----------
     hearing, sights : mappings of str to tensor, optional
         See `Simulator`.
+    watch : callable, optional
+        Looks on; see `Watch`.
 
     Returns
     -------
@@ -70,11 +79,11 @@ def walk_room(
         Where the agent needs an observation that is not there.
     """
     simulator = Simulator(place, episodes, protocol, hearing, sights)
-    walk(agent, simulator)
+    walk(agent, simulator, watch)
     return records(simulator, labels)
 
 
-def walk(agent: Agent, simulator: Simulator) -> None:
+def walk(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> None:
     """Run all episodes of a simulator to their end.
 
     An agent gets observations and nothing else; only one that says it is privileged is shown the
@@ -98,8 +107,13 @@ def walk(agent: Agent, simulator: Simulator) -> None:
         agent.reveal(simulator)
     with torch.inference_mode():
         while not bool(simulator.done.all()):
-            observation = simulator.step(agent.act(observation))
+            actions = agent.act(observation)
+            if watch:
+                watch(simulator, agent, observation, actions)
+            observation = simulator.step(actions)
             agent.rest(simulator.done)
+    if watch:
+        watch(simulator, agent, observation, None)
 
 
 def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:

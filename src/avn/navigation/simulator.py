@@ -228,7 +228,7 @@ class Simulator:
         self._first_clip = self.source * states * self._clips_of_state + self.sound * takes
         if takes > 1:
             draws = self.protocol.max_actions + 1
-            self._takes = _drawn_takes(self.episodes, draws, takes).reshape(-1)
+            self._takes = drawn_takes(self.episodes, draws, takes).reshape(-1)
             self._take_row = torch.arange(len(self)) * draws
 
     def _clip(self) -> Tensor:
@@ -266,7 +266,7 @@ def _positions(lattice: NDArray[np.int32]) -> Tensor:
     return torch.from_numpy(np.concatenate((place, turns), axis=2).reshape(-1, 3).astype(np.int64))
 
 
-def _drawn_takes(episodes: Episodes, draws: int, takes: int) -> Tensor:
+def drawn_takes(episodes: Episodes, draws: int, takes: int) -> Tensor:
     """The take that each episode hears after each number of actions, (N, draws) int16."""
     keys, steps = episodes.keys(), np.arange(draws)
     table = np.empty((len(keys), draws), dtype=np.int16)
