@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
@@ -80,7 +80,7 @@ class Simulator:
         self._next = self.transitions.reshape(-1)
         goal = np.repeat(self.distances.goal, HEADINGS, axis=1)
         self._goal, self._goal_row = torch.from_numpy(goal.reshape(-1)), self.source * states
-        self._seen_from = _positions(place.grid.lattice)
+        self._seen_from = positions(place.grid.lattice)
         self._frame = self.start % HEADINGS * states
         self._origin = self._seen_from[self._frame + self.start]
         self._hear(hearing)
@@ -253,7 +253,7 @@ class Simulator:
             )
 
 
-def _positions(lattice: NDArray[np.int32]) -> Tensor:
+def positions(lattice: NDArray[np.int32]) -> Tensor:
     """Where a state lies as an agent sees it that faces each heading, (4 x 4 C, 3) int64.
 
     By heading of the beholder and state: cells to the right and to the front from the lattice's
@@ -266,9 +266,15 @@ def _positions(lattice: NDArray[np.int32]) -> Tensor:
     return torch.from_numpy(np.concatenate((place, turns), axis=2).reshape(-1, 3).astype(np.int64))
 
 
-def drawn_takes(episodes: Episodes, draws: int, takes: int) -> Tensor:
-    """The take that each episode hears after each number of actions, (N, draws) int16."""
+def drawn_takes(
+    episodes: Episodes, draws: int, takes: int, rows: Sequence[int] | None = None
+) -> Tensor:
+    """The take that each episode hears after each number of actions, (N, draws) int16.
+
+    `rows` are the episodes that are asked for, where not all.
+    """
     keys, steps = episodes.keys(), np.arange(draws)
+    keys = keys if rows is None else keys[rows]
     table = np.empty((len(keys), draws), dtype=np.int16)
     for begin in range(0, len(keys), _CHUNK):
         part = slice(begin, begin + _CHUNK)

@@ -1,0 +1,215 @@
+"""Finished runs, walked again from their own config, so that pictures show what happened in them.
+
+Runs are deterministic: a run that cannot be walked again to the very same records was made by
+other code, and is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from avn import config, evaluation, pipeline, senses
+from avn.cli import conf_folder
+from avn.dataset.scene import Scene
+from avn.errors import UserError
+from avn.navigation.trace import Recorder, Trace
+
+SHOWS = ("typical", "success", "failure")
+
+
+@dataclass
+class Run:
+    """A finished run.
+
+    Attributes
+    ----------
+    folder : Path
+    cfg : DictConfig
+    results, episodes : DataFrame
+        `results.csv` and `episodes.csv`.
+    """
+
+    folder: Path
+    cfg: DictConfig
+    results: pd.DataFrame
+    episodes: pd.DataFrame
+    _rooms: list[Scene] = field(default_factory=list)
+
+    @property
+    def rooms(self) -> list[Scene]:
+        """The scenes that were walked."""
+        if not self._rooms:
+            self._rooms = pipeline.scenes(self.cfg, (self.cfg.part,))[self.cfg.part]
+        return self._rooms
+
+
+def open_run(folder: Path) -> Run:
+    """Read a finished run from its folder, `outputs/eval/<agent>/<sounds>/<run>`.
+
+    Raises
+    ------
+    UserError
+        Where it is no run's folder, or a file of it is damaged or of another version of avn.
+    """
+    path = folder.resolve() / "config.yaml"
+    if not path.is_file():
+        raise UserError(f"{folder}: no run's folder, it has no config.yaml; give one of avn.eval")
+    table, episodes = evaluation.read(folder)
+    try:
+        cfg = _typed(OmegaConf.load(path))
+        # wherever the outputs have been moved to since
+        cfg.outputs = str(path.parents[4])
+    except (OmegaConfBaseException, OSError, ValueError, KeyError, IndexError) as error:
+        line = " ".join(str(error).split())
+        raise UserError(f"{path}: not a config of this avn ({line}); run avn.eval again") from error
+    return Run(folder, cfg, table, episodes)
+
+
+def _typed(plain: Any) -> DictConfig:
+    """A config as it was composed, with the schema of each group; what is new has its default."""
+    config.register()
+    if GlobalHydra.instance().is_initialized():
+        cfg = compose("eval")
+    else:
+        with initialize_config_dir(str(conf_folder()), version_base="1.3"):
+            cfg = compose("eval")
+    for key, value in plain.items():
+        if isinstance(value, DictConfig) and isinstance(cfg.get(key), DictConfig):
+            cfg[key] = _with_schema(str(key), value, cfg[key])
+        else:
+            cfg[key] = value
+    return cfg
+
+
+def _with_schema(group: str, node: DictConfig, default: DictConfig) -> DictConfig:
+    """A group's node with that of its schemas that fits it best: the fewest keys it has not."""
+    found = [schema for (own, _), schema in config.SCHEMAS.items() if own == group]
+    nodes = [OmegaConf.structured(schema) for schema in found]
+    fitting = [own for own in nodes if set(map(str, node)) <= set(map(str, own))]
+    if not fitting:
+        return OmegaConf.merge(default, node)  # type: ignore[return-value]
+    best = min(fitting, key=lambda own: (len(own), own._metadata.object_type.__name__))
+    return OmegaConf.merge(best, node)  # type: ignore[return-value]
+
+
+def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
+    """Rows of `episodes.csv` that are worth showing.
+
+    Parameters
+    ----------
+    episodes : DataFrame
+        Records of one run, or some of them.
+    show : {"typical", "success", "failure"}
+        Those nearest to the median SPL; those that succeeded by their SPL nearest to the median
+        of these; those that failed, by how far from the source they ended.
+    count : int
+        At most so many, as far apart in sounds and rooms as there are.
+
+    Returns
+    -------
+    list of int
+        Index labels of `episodes`, the fittest first.
+    """
+    if show not in SHOWS:
+        raise UserError(f"film_show: '{show}' is none of {', '.join(SHOWS)}")
+    chosen = episodes
+    if show != "typical":
+        chosen = episodes[episodes["success"] == (show == "success")]
+    if not len(chosen) or count < 1:
+        return []
+    figure = "dtg" if show == "failure" else "spl"
+    off = (chosen[figure] - chosen[figure].median()).abs()
+    # of equals the one with the middle number of actions, for none is odd in that
+    busy = (chosen["actions"] - chosen["actions"].median()).abs()
+    ranked = chosen.assign(off=off, busy=busy).sort_values(["off", "busy"], kind="stable")
+    ranked["round"] = ranked.groupby(["room", "sound"]).cumcount()
+    ranked["room_round"] = ranked.groupby(["round", "room"]).cumcount()
+    ranked = ranked.sort_values(["round", "room_round", "off", "busy"], kind="stable")
+    return [int(label) for label in ranked.index[:count]]
+
+
+def traces(run: Run, labels: Sequence[int], thoughts: bool = True) -> list[Trace]:
+    """Walk a run again, in the rooms of some episodes, and keep their traces.
+
+    Parameters
+    ----------
+    run : Run
+    labels : sequence of int
+        Rows of `episodes.csv`.
+    thoughts : bool
+        Whether what an agent with a map took to be true is kept too.
+
+    Raises
+    ------
+    UserError
+        Where the walk is another than the one that the run recorded.
+    """
+    (found,) = walk_again(run, [(labels, thoughts)])
+    return found
+
+
+def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[list[Trace]]:
+    """As `traces`, of several choices in one walk."""
+    asked = list(wanted)
+    names = set(run.episodes.loc[[label for labels, _ in asked for label in labels], "room"])
+    observed = evaluation.wanted_by(run.cfg)
+    hearing = senses.heard(run.cfg, run.rooms, observed)
+    sights = senses.seen(run.cfg, run.rooms, observed)
+    kept = [index for index, room in enumerate(run.rooms) if room.name in names]
+    # in a batch the episodes of a room stand in the order of its records
+    rows = run.episodes.groupby("room").cumcount()
+    recorders = [
+        Recorder(_by_room(run, rows, labels), run.cfg.takes, thoughts) for labels, thoughts in asked
+    ]
+
+    def watch(*step: Any) -> None:
+        for recorder in recorders:
+            recorder(*step)
+
+    walked = evaluation.walk_rooms(
+        run.cfg,
+        [run.rooms[i] for i in kept],
+        [hearing[i] for i in kept],
+        [sights[i] for i in kept],
+        watch,
+    )
+    for frame in walked:
+        _check_same(run, frame)
+    return [
+        [
+            recorder.trace(str(row["room"]), int(rows[label]), row)
+            for label, row in zip(labels, _records(run, labels), strict=True)
+        ]
+        for recorder, (labels, _) in zip(recorders, asked, strict=True)
+    ]
+
+
+def _by_room(run: Run, rows: pd.Series, labels: Sequence[int]) -> dict[str, list[int]]:
+    own = run.episodes.loc[list(labels), "room"]
+    return {str(room): rows.loc[part.index].tolist() for room, part in own.groupby(own)}
+
+
+def _records(run: Run, labels: Sequence[int]) -> list[Mapping[str, Any]]:
+    found = run.episodes.loc[list(labels)].to_dict("records")
+    return [{**row, "row": int(label)} for label, row in zip(labels, found, strict=True)]  # type: ignore[dict-item]
+
+
+def _check_same(run: Run, walked: pd.DataFrame) -> None:
+    room = walked["room"].iloc[0]
+    own = run.episodes[run.episodes["room"] == room].reset_index(drop=True)
+    try:
+        pd.testing.assert_frame_equal(walked, own, check_dtype=False, rtol=1e-9)
+    except AssertionError as error:
+        raise UserError(
+            f"{run.folder}: walked again, {room} has other episodes than episodes.csv; the run is "
+            "of another version of avn or of its networks; run avn.eval again"
+        ) from error
