@@ -6,7 +6,7 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
-from avn import listening
+from avn import listening, reinforcement
 from avn.agents.base import Agent
 from avn.errors import UserError
 from avn.modules.network import build_part
@@ -33,11 +33,12 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
         )
     if cfg.baseline._target_:
         check_no_truth(cfg)
-        return build_part(cfg.baseline)
+        learnt = reinforcement.parts(cfg, ready) if reinforcement.learns(cfg) else {}
+        return build_part(cfg.baseline, "baseline", **learnt)
     if not cfg.planner._target_:
         raise UserError(
-            "baseline: 'none' cannot act, and there is no planner; choose random_walk, greedy or "
-            "oracle, or planner=dijkstra"
+            "baseline: 'none' cannot act, and there is no planner; choose random_walk, greedy, "
+            "oracle or a3c, or planner=dijkstra"
         )
     if not cfg.mapper._target_:
         raise UserError("mapper: 'none' remembers nothing to plan on; choose occupancy")
@@ -50,7 +51,8 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
 def acting(cfg: DictConfig) -> list[Any]:
     """The settings by which it acts, for the hash of a run."""
     if not cfg.planner._target_:
-        return [cfg.baseline]
+        learnt = [reinforcement.policy_hash(cfg)] if reinforcement.learns(cfg) else []
+        return [cfg.baseline, *learnt]
     return [cfg.planner, _settings(cfg.mapper)]
 
 

@@ -14,6 +14,7 @@ from omegaconf import II, MISSING
 
 from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.clips import MicrophoneConfig
+from avn.agents.actor_critic import ActorCriticConfig
 from avn.agents.base import BaselineConfig
 from avn.agents.greedy import GreedyConfig
 from avn.agents.planner_agent import PlannerConfig
@@ -22,10 +23,14 @@ from avn.mapping.config import MapperConfig, MemoryConfig
 from avn.modules.sound_cnn import SoundModelConfig
 from avn.modules.stop_classifier import StopModelConfig
 from avn.navigation.protocols import ProtocolConfig
+from avn.rl.config import A3CConfig
 from avn.views.backbone import BackboneConfig
 from avn.views.cycles import CyclesConfig
 from avn.views.raycast import RaycastConfig
 from avn.views.renderer import RendererConfig
+
+# Every recipe is trained with the one `train_seed`, unless it is given its own.
+_SEED: Any = II("train_seed")
 
 
 @dataclass
@@ -63,6 +68,7 @@ class CoreConfig:
     mapper: MapperConfig = MISSING
     planner: PlannerConfig = MISSING
     baseline: BaselineConfig = MISSING
+    a3c: A3CConfig = field(default_factory=lambda: A3CConfig(train_seed=_SEED))
     look: str = MISSING
     exploration: str = MISSING
     localisation: str = MISSING
@@ -87,6 +93,8 @@ class TrainConfig(CoreConfig):
     """Schema of `train.yaml`."""
 
     model: ModelConfig = MISSING
+    # The row whose agent is trained, for `model=a3c_v` and the like.
+    agent: AgentConfig = field(default_factory=lambda: AgentConfig(name="none"))
 
 
 @dataclass
@@ -114,9 +122,8 @@ COMMANDS = {
     "eval": EvalConfig,
     "reproduce": ReproduceConfig,
 }
-# Every recipe is trained with the one `train_seed`, unless it is given its own.
-_SEED: Any = II("train_seed")
-# The schema of each group that has one; `greedy_schema` is of an option with its own settings.
+# The schema of each group that has one; `greedy_schema` and the like are of an option with its
+# own settings.
 SCHEMAS = {
     ("split", "schema"): SplitConfig,
     ("acoustics", "schema"): AcousticsConfig,
@@ -133,6 +140,7 @@ SCHEMAS = {
     ("planner", "schema"): PlannerConfig(look=II("look")),
     ("baseline", "schema"): BaselineConfig,
     ("baseline", "greedy_schema"): GreedyConfig,
+    ("baseline", "a3c_schema"): ActorCriticConfig,
 }
 
 

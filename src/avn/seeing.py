@@ -165,6 +165,12 @@ def sights(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
     return [found[:, 1].contiguous() for found in _windows(cfg, chosen)]
 
 
+def trusted_windows(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
+    """As `windows`, with NaN where a cell is not visible enough to tell anything."""
+    both = zip(windows(cfg, chosen), sights(cfg, chosen), strict=True)
+    return [torch.where(sight >= cfg.mapper.visible_above, said, torch.nan) for said, sight in both]
+
+
 def window_prior(cfg: DictConfig) -> Tensor:
     """How often each cell of the window is free in the training apartments, (5, 5) float32."""
     return torch.tensor(read_metrics(occupancy_model(cfg)[1])["prior"])

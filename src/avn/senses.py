@@ -9,11 +9,11 @@ import torch
 from omegaconf import DictConfig
 from torch import Tensor
 
-from avn import listening, pipeline, recognition, seeing
+from avn import listening, pipeline, recognition, seeing, sound_features
 from avn.datamodules.sound import where_sources_are
 from avn.dataset.scene import Scene
 
-SOUNDS, SIGHTS = ("sound", "reach"), ("view", "depth", "feature", "window")
+SOUNDS, SIGHTS = ("sound", "reach", "sound_feature"), ("view", "depth", "feature", "window")
 
 
 def heard(
@@ -42,6 +42,11 @@ def heard(
         pipeline.scenes(cfg, (cfg.part,), audible=True)
         for own, estimates in zip(found, listening.hearing(cfg, rooms), strict=True):
             own["sound"] = estimates
+    if "sound_feature" in wanted and listening.hears(cfg):
+        pipeline.scenes(cfg, (cfg.part,), audible=True)
+        features = sound_features.sound_features(cfg, rooms, sound_features.evaluated_clips(cfg))
+        for own, found_here in zip(found, features, strict=True):
+            own["sound_feature"] = found_here
     if "reach" in wanted and listening.can_stop(cfg):
         pipeline.scenes(cfg, (cfg.part,), audible=True)
         for own, scores in zip(found, listening.stop_scores(cfg, rooms), strict=True):
@@ -62,9 +67,8 @@ def seen(cfg: DictConfig, rooms: Sequence[Scene], wanted: Sequence[str]) -> list
             free, seen_there = seeing.true_windows(cfg, room)
             own["window"] = torch.where(seen_there, free.float(), torch.nan)
     elif "window" in wanted and seeing.sees_windows(cfg):
-        windows, visible = seeing.windows(cfg, rooms), seeing.sights(cfg, rooms)
-        for own, said, sight in zip(found, windows, visible, strict=True):
-            own["window"] = torch.where(sight >= cfg.mapper.visible_above, said, torch.nan)
+        for own, said in zip(found, seeing.trusted_windows(cfg, rooms), strict=True):
+            own["window"] = said
     if "feature" in wanted:
         for own, features in zip(
             found, recognition.features(cfg, (cfg.part,))[cfg.part], strict=True
@@ -87,6 +91,8 @@ def senses_hash(cfg: DictConfig, wanted: Sequence[str]) -> list[Any]:
     parts: list[Any] = []
     if "sound" in wanted and listening.hears(cfg) and "location" not in cfg.agent.truth:
         parts.append(listening.hear_hash(cfg))
+    if "sound_feature" in wanted and listening.hears(cfg):
+        parts.append(sound_features.features_hash(cfg, sound_features.evaluated_clips(cfg)))
     if "reach" in wanted and listening.can_stop(cfg):
         parts += [listening.stop_hash(cfg), cfg.stop_model.criterion, cfg.stop_model.threshold]
     if set(wanted) & set(SIGHTS):

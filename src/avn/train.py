@@ -9,7 +9,7 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from avn import learned, listening, seeing
+from avn import learned, listening, reinforcement, seeing
 from avn.cli import command
 from avn.errors import UserError
 from avn.stages import tell
@@ -22,6 +22,7 @@ MODELS: dict[str, tuple[Callable[..., tuple[Any, Path]], tuple[str, ...]]] = {
         listening.stop_model,
         ("auc/validation", "ece/validation", "threshold/", "miss/", "false_"),
     ),
+    "a3c": (reinforcement.policy, ("best/", "untrained/", "seconds", "steps")),
     "occupancy_cnn": (seeing.occupancy_model, ("accuracy/", "auc/", "ece/", "loss/")),
 }
 

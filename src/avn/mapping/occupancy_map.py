@@ -71,6 +71,20 @@ class OccupancyMap:
         """Squares on which the agents have stood, (N, M, M) bool."""
         return self.log_odds >= CERTAIN
 
+    def forget(self, rows: Tensor) -> None:
+        """Make the maps of some agents, by number, as they were at first."""
+        self.log_odds[rows], self.walls[rows], self._seen[rows] = 0.0, 0, False
+
+    def state_dict(self) -> dict[str, Tensor]:
+        """All that is believed."""
+        return {"log_odds": self.log_odds, "walls": self.walls, "seen": self._seen}
+
+    def load_state_dict(self, kept: dict[str, Tensor]) -> None:
+        """Believe what `state_dict` gave."""
+        self.log_odds, self.walls, self._seen = (
+            kept[name].clone() for name in ("log_odds", "walls", "seen")
+        )
+
     def flat(self, squares: Tensor) -> Tensor:
         """Where squares (right, front) from the origin lie in a map laid out flat.
 

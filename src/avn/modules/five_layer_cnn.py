@@ -88,6 +88,7 @@ class FiveLayerCnn(nn.Module):
         for wide in hidden:
             layers += [nn.Dropout(dropout), nn.Linear(size, wide), nn.ReLU()]
             size = wide
+        self.hidden_size, self._answer = size, len(layers)
         layers += [nn.Dropout(dropout), nn.Linear(size, outputs)]
         layers += [nn.Tanh()] if tanh else []
         self.layers = nn.Sequential(*layers)
@@ -95,3 +96,11 @@ class FiveLayerCnn(nn.Module):
     def forward(self, pictures: Tensor) -> Tensor:
         """(N, channels, height, width) pictures to (N, outputs)."""
         return self.layers(pictures) * self.reach
+
+    def hidden(self, pictures: Tensor) -> Tensor:
+        """What the last dense layer is given, (N, `hidden_size`)."""
+        return self.layers[: self._answer](pictures)
+
+    def answer(self, hidden: Tensor) -> Tensor:
+        """What `forward` gives, (N, outputs), from what `hidden` gave."""
+        return self.layers[self._answer :](hidden) * self.reach

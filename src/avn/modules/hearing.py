@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 
 import numpy as np
@@ -31,6 +31,8 @@ def hear(
     microphone: MicrophoneConfig,
     seed: int = 0,
     progress: bool = True,
+    purpose: str = "eval",
+    answer: Callable[[Tensor], Tensor] | None = None,
 ) -> Tensor:
     """Listen in every state to every source, with every sound, in each evaluation take.
 
@@ -44,12 +46,16 @@ def hear(
     model : Listener
         Trained; it is set to evaluation.
     takes : int
-        Takes 0 to `takes` - 1 of the purpose "eval".
+        Takes 0 to `takes` - 1 of the purpose.
     microphone : MicrophoneConfig
     seed : int
         Draws the takes.
     progress : bool
         Whether a bar with rate and time left is shown.
+    purpose : {"eval", "train"}
+        Takes of the one are never those of the other.
+    answer : callable, optional
+        What is made of clips; by default what the model says.
 
     Returns
     -------
@@ -57,7 +63,7 @@ def hear(
         The model's answer to each clip; for the sound network 2 metres, right and front.
     """
     brirs = scene.brirs(regime)
-    renderer = ClipRenderer(sounds, microphone, seed, "eval")
+    renderer = ClipRenderer(sounds, microphone, seed, purpose)
     sources, states = len(scene.sources), 4 * len(scene.grid.lattice)
     source, state = torch.cartesian_prod(torch.arange(sources), torch.arange(states)).unbind(1)
     each = len(sounds.names) * takes
@@ -74,7 +80,7 @@ def hear(
         index = torch.arange(len(rows)).repeat_interleave(each)
         which = (source[rows][index], state[rows][index], sound.repeat(len(rows)))
         clips = renderer.render(spectra, *which, take.repeat(len(rows)), index)
-        return model(clips.to(model.device)).cpu()
+        return (answer or model)(clips.to(model.device)).cpu()
 
     threads, parts = torch.get_num_threads(), torch.arange(len(source)).split(max(1, BATCH // each))
     with bar as advance, threads_for_one_operation(1):

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import torch
 from lightning.pytorch.callbacks import Callback
 from omegaconf import MISSING
 from torch import Tensor, nn
 from torchmetrics import MeanSquaredError
 
-from avn.modules.five_layer_cnn import NetConfig
+from avn.errors import UserError
+from avn.modules.five_layer_cnn import FiveLayerCnn, NetConfig
 from avn.modules.listener import Listener, PictureBatch
 from avn.modules.network import SPLITS, OptimizerConfig
 from avn.modules.sound_metrics import LocationErrors
@@ -114,6 +116,33 @@ class SoundCnn(Listener):
             Metres to the right and to the front.
         """
         return super().forward(clips)
+
+    def features(self, clips: Tensor) -> Tensor:
+        """What other networks learn from: the last hidden layer, and what the network says.
+
+        Parameters
+        ----------
+        clips : (N, 2, rate) float32 tensor
+
+        Returns
+        -------
+        (N, 2 * hidden + 2) float32 tensor
+            The hidden layer for the clip and for its mirror image, and the location in metres as
+            `forward` gives it for a network that is `symmetric`.
+
+        Raises
+        ------
+        UserError
+            Where the recipe's network is no `FiveLayerCnn`.
+        """
+        if not isinstance(self.net, FiveLayerCnn):
+            raise UserError(f"sound_model.net: {type(self.net).__name__} gives no features")
+        pictures = self.spectrogram(clips)
+        both = torch.cat((pictures, self.spectrogram.mirror(pictures)))
+        hidden = self.net.hidden(both.contiguous(memory_format=torch.channels_last))
+        straight, mirrored = self.net.answer(hidden).chunk(2)
+        location = (straight + mirrored * mirrored.new_tensor(self.mirror_signs)) / 2
+        return torch.cat((*hidden.chunk(2), location), dim=1)
 
     def figures(self) -> list[Callback]:
         """Locations on a floor plan, spectrograms and audio."""

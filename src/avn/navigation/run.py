@@ -29,6 +29,7 @@ _MAKERS = {
     "reach": "choose what tells when to stop, such as stop_model=cnn5",
     "window": "choose what sees free squares, such as mapper=occupancy",
     "feature": "choose what knows places again, such as mapper=spatial_memory",
+    "sound_feature": "choose a sound model, such as sound_model=cnn5",
 }
 
 

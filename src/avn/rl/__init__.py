@@ -1,0 +1,1 @@
+"""Reinforcement learning: the environment, the actor-critic networks and A3C."""

@@ -1,0 +1,170 @@
+"""The workers of A3C: one in this process, or several in processes of their own."""
+
+from __future__ import annotations
+
+import os
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from multiprocessing.connection import Connection, wait
+from typing import Any, Protocol
+
+import torch
+import torch.multiprocessing as mp
+
+from avn.errors import UserError
+from avn.rl.shared import SharedState
+from avn.rl.worker import Task, Worker
+from avn.stages import tell
+
+Report = tuple[dict[str, float], dict[str, Any]]
+# Seconds after which the progress is looked at again.
+_LOOK = 0.2
+
+
+class Crew(Protocol):
+    """All workers of a training."""
+
+    def round(self, updates: int, progress: Callable[[], None]) -> list[Report]:
+        """Let every worker make so many updates; gives figures and states, worker by worker."""
+
+    def close(self) -> None:
+        """End the workers."""
+
+
+class LocalCrew:
+    """One worker, in this process and with one thread."""
+
+    def __init__(self, task: Task, shared: SharedState, states: list[dict[str, Any]]) -> None:
+        self._threads = torch.get_num_threads()
+        torch.set_num_threads(1)
+        self._worker = Worker(0, task, shared, nullcontext)
+        if states:
+            self._worker.load_state_dict(states[0])
+
+    def round(self, updates: int, progress: Callable[[], None]) -> list[Report]:
+        """Let the worker make so many updates."""
+        return [(self._worker.round(updates, progress), self._worker.state_dict())]
+
+    def close(self) -> None:
+        """Give the threads back."""
+        torch.set_num_threads(self._threads)
+
+
+class SpawnedCrew:
+    """Workers in processes of their own, with one thread each.
+
+    Raises
+    ------
+    UserError
+        In `round`, where a worker dies; the others are ended.
+    """
+
+    def __init__(self, task: Task, shared: SharedState, states: list[dict[str, Any]]) -> None:
+        context, count = mp.get_context("spawn"), task.recipe.workers
+        task.tables.share()
+        locks = _locks(context, task.recipe.order, count)
+        self._links: list[Connection] = []
+        self._processes = []
+        for rank in range(count):
+            ours, theirs = context.Pipe()
+            turn = (locks[rank], locks[(rank + 1) % count])
+            state = states[rank] if states else None
+            process = context.Process(
+                target=_work, args=(rank, task, shared, turn, theirs, state), daemon=True
+            )
+            process.start()
+            theirs.close()
+            self._links.append(ours)
+            self._processes.append(process)
+
+    def round(self, updates: int, progress: Callable[[], None]) -> list[Report]:
+        """Let every worker make so many updates."""
+        for link in self._links:
+            link.send(updates)
+        reports: dict[int, Report] = {}
+        while len(reports) < len(self._links):
+            progress()
+            open_links = [link for i, link in enumerate(self._links) if i not in reports]
+            for ready in wait([*open_links], timeout=_LOOK):
+                rank = next(i for i, link in enumerate(self._links) if link is ready)
+                reports[rank] = self._report(rank)
+        progress()
+        return [reports[rank] for rank in range(len(self._links))]
+
+    def _report(self, rank: int) -> Report:
+        try:
+            kind, found = self._links[rank].recv()
+        except (EOFError, ConnectionError):
+            self._processes[rank].join(5)
+            code = self._processes[rank].exitcode
+            kind, found = "died", f"its process ended with code {code}"
+        if kind == "done":
+            return found
+        self.close()
+        if kind == "refused":
+            raise UserError(found)
+        raise UserError(
+            f"a3c.workers: worker {rank} died: {found}; the last checkpoint is whole, the same "
+            "command goes on from it"
+        )
+
+    def close(self) -> None:
+        """End the processes."""
+        for process in self._processes:
+            process.terminate()
+        for process in self._processes:
+            process.join()
+
+
+def _locks(context: Any, order: str, count: int) -> list[Any]:
+    """What a worker takes for its turn, by rank; it gives back that of the next rank."""
+    if order == "free":
+        return [context.Semaphore(1)] * count
+    return [context.Semaphore(int(rank == 0)) for rank in range(count)]
+
+
+@contextmanager
+def _turn(own: Any, following: Any) -> Iterator[None]:
+    own.acquire()
+    yield
+    following.release()
+
+
+def _work(
+    rank: int,
+    task: Task,
+    shared: SharedState,
+    locks: tuple[Any, Any],
+    link: Connection,
+    state: dict[str, Any] | None,
+) -> None:
+    """What a process does: rounds, until it is ended."""
+    torch.set_num_threads(1)
+
+    def turn() -> AbstractContextManager[None]:
+        return _turn(*locks)
+
+    try:
+        worker = Worker(rank, task, shared, turn)
+        if state is not None:
+            worker.load_state_dict(state)
+        while True:
+            figures = worker.round(link.recv())
+            link.send(("done", (figures, worker.state_dict())))
+    except (EOFError, KeyboardInterrupt):
+        return
+    except UserError as error:
+        link.send(("refused", str(error)))
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{os.path.basename(last.filename)}:{last.lineno}"
+        link.send(("died", f"{type(error).__name__}: {error} ({where})"))
+
+
+def start_crew(task: Task, shared: SharedState, states: list[dict[str, Any]]) -> Crew:
+    """Start the workers of a recipe, from their states where there are any."""
+    cores, workers = os.cpu_count() or 1, task.recipe.workers
+    if workers > cores:
+        tell(f"a3c.workers: {workers} workers share {cores} cores and will wait for one another")
+    return (LocalCrew if workers == 1 else SpawnedCrew)(task, shared, states)
