@@ -96,6 +96,18 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
             sweeps.forget()
 
 
+def plainly(name: str, task: Callable[[], None]) -> int:
+    """Run a command that has no config of its own; the exit codes are those of `command`."""
+    try:
+        task()
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        return _report(name, error, explain(error))
+    return 0
+
+
 def _report(name: str, error: Exception, line: str | None) -> int:
     if line is None:
         traceback.print_exception(error)

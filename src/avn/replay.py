@@ -23,6 +23,8 @@ from avn.dataset.scene import Scene
 from avn.errors import UserError
 from avn.navigation.trace import Recorder, Trace
 
+# Settings that a run is named by where it differs in them from the others.
+_TELLING = ("protocol", "acoustics", "look", "localisation", "exploration", "seed", "train_seed")
 SHOWS = ("typical", "success", "failure")
 
 
@@ -128,13 +130,59 @@ def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
         return []
     figure = "dtg" if show == "failure" else "spl"
     off = (chosen[figure] - chosen[figure].median()).abs()
-    # of equals the one with the middle number of actions, for none is odd in that
-    busy = (chosen["actions"] - chosen["actions"].median()).abs()
-    ranked = chosen.assign(off=off, busy=busy).sort_values(["off", "busy"], kind="stable")
+    # of equals the one whose source is as far away as usual, for it is neither easy nor odd
+    far = (chosen["geodesic"] - episodes["geodesic"].median()).abs()
+    ranked = chosen.assign(off=off, far=far).sort_values(["off", "far"], kind="stable")
     ranked["round"] = ranked.groupby(["room", "sound"]).cumcount()
     ranked["room_round"] = ranked.groupby(["round", "room"]).cumcount()
-    ranked = ranked.sort_values(["round", "room_round", "off", "busy"], kind="stable")
+    ranked = ranked.sort_values(["round", "room_round", "off", "far"], kind="stable")
     return [int(label) for label in ranked.index[:count]]
+
+
+def same_episodes(run: Run, labels: Sequence[int], other: Run) -> list[int]:
+    """Rows of another run's `episodes.csv` with the same episodes.
+
+    Raises
+    ------
+    UserError
+        Where the other run did not walk them.
+    """
+    keys = ["room", "sound", "seed", "episode", "source", "start_cell", "start_heading"]
+    own = _rows(other.episodes[keys])
+    where = {tuple(row): i for i, row in zip(other.episodes.index, own, strict=True)}
+    wanted = [tuple(row) for row in _rows(run.episodes.loc[list(labels), keys])]
+    if not set(wanted) <= set(where):
+        raise UserError(
+            f"{other.folder}: walked other episodes than {run.folder}; give runs with the same "
+            "split, protocol, sound and seed"
+        )
+    return [int(where[row]) for row in wanted]
+
+
+def _rows(frame: pd.DataFrame) -> list[list[Any]]:
+    return [list(row) for row in frame.itertuples(index=False)]
+
+
+def names_of(runs: Sequence[Run]) -> list[str]:
+    """Names that tell runs apart: the agent, and those settings in which they differ."""
+    settings = [_flat(run.cfg) for run in runs]
+    keys = [key for key in settings[0] if len({own.get(key) for own in settings}) > 1]
+    shown = [key for key in keys if key.split(".")[0] in _TELLING]
+    names = []
+    for run, own in zip(runs, settings, strict=True):
+        parts = [f"{key.removesuffix('.name')}={own[key]}" for key in shown if key in own]
+        names.append(", ".join((str(run.cfg.agent.name), *parts)))
+    if len(set(names)) < len(names):  # settings of networks or of rooms
+        names = [f"{name} ({run.folder.name})" for name, run in zip(names, runs, strict=True)]
+    return names
+
+
+def _flat(node: Any, path: str = "") -> dict[str, str]:
+    """A config as dotted keys and texts."""
+    if isinstance(node, DictConfig):
+        parts = (_flat(node[key], f"{path}.{key}" if path else key) for key in map(str, node))
+        return {key: value for part in parts for key, value in part.items()}
+    return {path: str(node)}
 
 
 def traces(run: Run, labels: Sequence[int], thoughts: bool = True) -> list[Trace]:
@@ -171,9 +219,9 @@ def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[l
         Recorder(_by_room(run, rows, labels), run.cfg.takes, thoughts) for labels, thoughts in asked
     ]
 
-    def watch(*step: Any) -> None:
-        for recorder in recorders:
-            recorder(*step)
+    def watch(*step: Any) -> bool:
+        enough = [recorder(*step) for recorder in recorders]  # each of them sees every step
+        return all(enough)
 
     walked = evaluation.walk_rooms(
         run.cfg,
@@ -182,8 +230,9 @@ def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[l
         [sights[i] for i in kept],
         watch,
     )
-    for frame in walked:
-        _check_same(run, frame)
+    _check_same(
+        run, pd.concat(walked, ignore_index=True), [own for part, _ in asked for own in part]
+    )
     return [
         [
             recorder.trace(str(row["room"]), int(rows[label]), row)
@@ -203,13 +252,17 @@ def _records(run: Run, labels: Sequence[int]) -> list[Mapping[str, Any]]:
     return [{**row, "row": int(label)} for label, row in zip(labels, found, strict=True)]  # type: ignore[dict-item]
 
 
-def _check_same(run: Run, walked: pd.DataFrame) -> None:
-    room = walked["room"].iloc[0]
-    own = run.episodes[run.episodes["room"] == room].reset_index(drop=True)
+def _check_same(run: Run, walked: pd.DataFrame, labels: Sequence[int]) -> None:
+    """Raise `UserError` unless the episodes of `labels` went as the run's records say."""
+    keys = ["room", "sound", "episode"]
+    own = run.episodes.loc[sorted(set(labels))]
+    again = own[keys].merge(walked, on=keys, how="left")[list(own.columns)]
     try:
-        pd.testing.assert_frame_equal(walked, own, check_dtype=False, rtol=1e-9)
+        pd.testing.assert_frame_equal(
+            again, own.reset_index(drop=True), check_dtype=False, rtol=1e-9
+        )
     except AssertionError as error:
         raise UserError(
-            f"{run.folder}: walked again, {room} has other episodes than episodes.csv; the run is "
-            "of another version of avn or of its networks; run avn.eval again"
+            f"{run.folder}: walked again, its episodes end otherwise than episodes.csv says; the "
+            "run is of another version of avn or of its networks: run avn.eval again"
         ) from error

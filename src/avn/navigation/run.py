@@ -34,8 +34,8 @@ _MAKERS = {
 
 
 # What looks on at a walk: it is shown simulator and agent, what is observed, and the actions that
-# follow, which are None when all episodes are over.
-Watch = Callable[[Simulator, Agent, TensorDict, Tensor | None], None]
+# follow, which are None when all episodes are over; it says whether it has seen enough.
+Watch = Callable[[Simulator, Agent, TensorDict, Tensor | None], bool]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,8 @@ def walk_room(
     hearing, sights : mappings of str to tensor, optional
         See `Simulator`.
     watch : callable, optional
-        Looks on; see `Watch`.
+        Looks on; see `Watch`. When it has seen enough the walk is broken off, and what the records
+        say of episodes that still run is void.
 
     Returns
     -------
@@ -109,8 +110,8 @@ def walk(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> None
     with torch.inference_mode():
         while not bool(simulator.done.all()):
             actions = agent.act(observation)
-            if watch:
-                watch(simulator, agent, observation, actions)
+            if watch and watch(simulator, agent, observation, actions):
+                return
             observation = simulator.step(actions)
             agent.rest(simulator.done)
     if watch:

@@ -120,12 +120,12 @@ class Recorder:
 
     def __call__(
         self, simulator: Simulator, agent: Agent, observation: TensorDict, actions: Tensor | None
-    ) -> None:
-        """Keep one step of the chosen episodes of a room."""
+    ) -> bool:
+        """Keep one step of the chosen episodes of a room; tells whether all of them are over."""
         room = simulator.place.name
         rows = self._rows.get(room, torch.empty(0).long())
         if not len(rows):
-            return
+            return True
         if room not in self._rooms:
             self._rooms[room] = simulator, agent.explores
         step = {"state": simulator.state[rows], "collided": observation["collided"][rows]}
@@ -138,6 +138,7 @@ class Recorder:
             if self._thinks and isinstance(mapper, Mapper):
                 step |= self._thought(simulator, mapper, rows)
         self._steps.setdefault(room, []).append({key: x.clone() for key, x in step.items()})
+        return bool(simulator.done[rows].all())
 
     def _thought(self, simulator: Simulator, mapper: Mapper, rows: Tensor) -> dict[str, Tensor]:
         """What a mapper holds true now, in the apartment's frame."""

@@ -1,0 +1,191 @@
+"""Episodes on the floor plan, as in the paper's figure 4, and where the source was heard."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from avn.apartments.floor_plan import CELL, FloorPlan
+from avn.navigation.actions import HEADINGS
+from avn.navigation.trace import Trace
+from avn.reporting.floor_plan_figure import draw_floor_plan
+
+# A colour for each run that is compared; they tell each other apart for colour-blind eyes too.
+RUN_COLOURS = ("#d1495b", "#1f6fb2", "#3a9a5b", "#8a5fbf", "#c98a1b", "#4d4d4d")
+FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
+
+
+def plan_of(trace: Trace) -> FloorPlan | None:
+    """The floor plan of a trace's apartment; None where it was drawn as text."""
+    return getattr(trace.place, "plan", None)
+
+
+def draw_place(axes: Axes, trace: Trace) -> None:
+    """Draw a trace's apartment faintly, in metres: floor plan, or cells alone, and the source."""
+    plan = plan_of(trace)
+    if plan is None:
+        for x, y in trace.place.grid.centres:
+            corner = (x - CELL / 2, y - CELL / 2)
+            axes.add_patch(Rectangle(corner, CELL, CELL, color="#f2efe8", zorder=0))
+        axes.set_aspect("equal")
+        axes.autoscale_view()
+    else:
+        draw_floor_plan(axes, plan, trace.place.grid)
+        for line in list(axes.lines):  # cells, edges and all sources would hide the walks
+            line.remove()
+        for text in list(axes.texts):
+            text.remove()
+        for patch in axes.patches:
+            if patch.get_zorder() == 3:  # walls, which overlap
+                patch.set_facecolor("#8d8d8d")
+            else:
+                patch.set_alpha(0.55)
+    axes.set(title="", xticks=[], yticks=[])
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=15, zorder=12)
+
+
+def draw_walk(
+    axes: Axes, trace: Trace, colour: str, label: str | None = None, shift: float = 0.0
+) -> None:
+    """Draw the path of an episode with its start, its end and the way it looked at the start.
+
+    Parameters
+    ----------
+    axes : Axes
+    trace : Trace
+    colour : str
+    label : str, optional
+        For the legend.
+    shift : float
+        Metres that the line is moved to the north-east, so that paths that meet stay visible.
+    """
+    path = trace.path + shift
+    axes.plot(*path.T, color=colour, linewidth=2.2, alpha=0.9, zorder=9, label=label)
+    moved = np.flatnonzero(np.any(np.diff(path, axis=0) != 0, axis=1))
+    for at in moved[len(moved) > 6 :: 4]:
+        middle, way = path[at : at + 2].mean(axis=0), path[at + 1] - path[at]
+        look: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "lw": 0}
+        axes.annotate("", middle + 0.18 * way, middle - 0.18 * way, arrowprops=look, zorder=10)
+    bumps = path[trace.collided]
+    axes.plot(*bumps.T, "x", color=colour, markersize=5, mew=1.2, zorder=10)
+    front = FRONT[trace.state[0] % HEADINGS]
+    axes.plot(*np.stack((path[0], path[0] + 0.32 * front)).T, color=colour, lw=2.2, zorder=10)
+    axes.plot(*path[0], "o", color="white", mec=colour, mew=2, markersize=8, zorder=11)
+    if trace.record["success"]:
+        axes.plot(*path[-1], "s", color=colour, mec="white", markersize=8, zorder=11)
+    else:
+        axes.plot(*path[-1], "X", color=colour, mec="white", markersize=10, zorder=11)
+
+
+def trajectory_figure(episodes: Sequence[Sequence[Trace]], names: Sequence[str]) -> Figure:
+    """Draw episodes on the floor plan, each as several runs walked it.
+
+    Parameters
+    ----------
+    episodes : sequence of sequences of Trace
+        By episode and run.
+    names : sequence of str
+        Of the runs.
+
+    Returns
+    -------
+    Figure
+        A panel for each episode: ring at the start, square at an end that succeeded and cross at
+        one that did not, small crosses where it ran into something, a star at the source.
+    """
+    columns = min(2, len(episodes))
+    rows = -(-len(episodes) // columns)
+    figure = figure_of(6.2 * columns, 5.6 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False).reshape(-1)
+    for axes in panels[len(episodes) :]:
+        axes.set_visible(False)
+    for axes, runs in zip(panels, episodes, strict=False):
+        draw_place(axes, runs[0])
+        for index, (trace, name) in enumerate(zip(runs, names, strict=True)):
+            shift = 0.06 * (index - (len(runs) - 1) / 2)
+            colour = RUN_COLOURS[index % len(RUN_COLOURS)]
+            draw_walk(axes, trace, colour, f"{name}: {outcome(trace)}", shift)
+        axes.set_title(title_of(runs[0]), fontsize=11)
+        axes.legend(
+            loc="upper left", bbox_to_anchor=(0, 0), frameon=False, fontsize=9, borderaxespad=0.2
+        )
+    return figure
+
+
+def estimate_figure(trace: Trace, name: str) -> Figure:
+    """Draw where the source was heard at each step, and how far off that was.
+
+    Raises
+    ------
+    ValueError
+        Where the agent did not hear.
+    """
+    if trace.heard is None:
+        raise ValueError("this agent did not hear where the source is")
+    figure = figure_of(11.5, 5.6)
+    left, right = figure.subplots(1, 2, width_ratios=(1.35, 1))
+    draw_place(left, trace)
+    draw_walk(left, trace, "#777777")
+    steps = np.arange(len(trace.heard))
+    look: dict[str, Any] = {"c": steps, "cmap": "viridis", "zorder": 8}
+    lines = np.stack((trace.path, trace.heard), axis=1)
+    for line, step in zip(lines, steps, strict=True):
+        left.plot(*line.T, color=cmap(step / max(1, len(steps) - 1)), lw=0.5, alpha=0.5, zorder=7)
+    dots = left.scatter(*trace.heard.T, s=34, edgecolor="white", linewidth=0.5, **look)
+    bar = figure.colorbar(dots, ax=left, orientation="horizontal", fraction=0.04, pad=0.02)
+    bar.set_label("action at which it was heard there")
+    left.set_title(f"{name}\n{title_of(trace)}", fontsize=10)
+    error = np.linalg.norm(trace.heard - trace.goal, axis=1)
+    away = np.linalg.norm(trace.path - trace.goal, axis=1)
+    right.plot(steps, error, color="#1f6fb2", label="estimate to source")
+    right.plot(steps, away, color="#777777", ls="--", label="agent to source")
+    right.set(xlabel="action", ylabel="metres", ylim=(0, None), xlim=(0, max(1, len(steps) - 1)))
+    right.grid(alpha=0.3)
+    right.legend(frameon=False)
+    return figure
+
+
+def cmap(share: float) -> tuple[float, float, float, float]:
+    """The colour of a step, by its share of the episode."""
+    from matplotlib import colormaps
+
+    colour: tuple[float, float, float, float] = colormaps["viridis"](share)
+    return colour
+
+
+def title_of(trace: Trace) -> str:
+    """Which episode it is, in words."""
+    record = trace.record
+    sight = "in sight" if record["in_sight"] else "out of sight"
+    return (
+        f"{record['room']}, {record['sound']}, episode {record['episode']}: "
+        f"source {record['geodesic']:.1f} m away, {sight}"
+    )
+
+
+def outcome(trace: Trace) -> str:
+    """How an episode ended, in words."""
+    word = str(trace.record["outcome"]).replace("_", " ")
+    return f"{word}, SPL {trace.record['spl']:.2f}, {len(trace.action)} actions"
+
+
+def figure_of(width: float, height: float) -> Figure:
+    """An empty figure of so many inches that needs no display."""
+    figure = Figure(figsize=(width, height), dpi=100, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def extent(low: NDArray[np.int64], shape: tuple[int, ...]) -> tuple[float, float, float, float]:
+    """Left, right, bottom and top in metres of an array of squares (H, W) from `low` on."""
+    x, y = (low - 0.5) * CELL
+    return (x, x + shape[1] * CELL, y, y + shape[0] * CELL)
