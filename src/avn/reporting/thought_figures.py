@@ -24,6 +24,8 @@ from avn.reporting.trajectory_figures import (
 )
 
 PANELS = 6
+# The path on a map of beliefs, where it must show on every colour.
+WALKED = "#e0218a"
 
 
 def belief_figure(trace: Trace, name: str) -> Figure:
@@ -70,10 +72,10 @@ def draw_belief(axes: Axes, trace: Trace, thoughts: Thoughts, step: int) -> Any:
             if patch.get_zorder() == 0:
                 patch.set_visible(False)
     path = trace.path[: step + 1]
-    axes.plot(*path.T, color="#222222", lw=1.6, zorder=5)
+    axes.plot(*path.T, color=WALKED, lw=2, zorder=5)
     front = FRONT[trace.state[step] % HEADINGS]
-    axes.plot(*np.stack((path[-1], path[-1] + 0.4 * front)).T, color="#222222", lw=1.6, zorder=5)
-    axes.plot(*path[-1], "o", color="white", mec="#222222", mew=1.6, markersize=7, zorder=6)
+    axes.plot(*np.stack((path[-1], path[-1] + 0.4 * front)).T, color=WALKED, lw=2, zorder=5)
+    axes.plot(*path[-1], "o", color="white", mec=WALKED, mew=2, markersize=7, zorder=6)
     if trace.heard is not None:
         axes.plot(*trace.heard[step], "P", color="#1f6fb2", mec="white", markersize=9, zorder=7)
     axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=12, zorder=7)

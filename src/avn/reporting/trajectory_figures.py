@@ -74,6 +74,7 @@ def draw_walk(
     for at in moved[len(moved) > 6 :: 4]:
         middle, way = path[at : at + 2].mean(axis=0), path[at + 1] - path[at]
         look: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "lw": 0}
+        look["mutation_scale"] = 14
         axes.annotate("", middle + 0.18 * way, middle - 0.18 * way, arrowprops=look, zorder=10)
     bumps = path[trace.collided]
     axes.plot(*bumps.T, "x", color=colour, markersize=5, mew=1.2, zorder=10)
@@ -144,6 +145,10 @@ def estimate_figure(trace: Trace, name: str) -> Figure:
     bar = figure.colorbar(dots, ax=left, orientation="horizontal", fraction=0.04, pad=0.02)
     bar.set_label("action at which it was heard there")
     left.set_title(f"{name}\n{title_of(trace)}", fontsize=10)
+    (x0, x1), (y0, y1) = left.get_xlim(), left.get_ylim()  # some of what is heard lies outside
+    (low_x, low_y), (high_x, high_y) = trace.heard.min(0) - 0.3, trace.heard.max(0) + 0.3
+    left.set_xlim(max(min(x0, low_x), x0 - 2), min(max(x1, high_x), x1 + 2))
+    left.set_ylim(max(min(y0, low_y), y0 - 2), min(max(y1, high_y), y1 + 2))
     error = np.linalg.norm(trace.heard - trace.goal, axis=1)
     away = np.linalg.norm(trace.path - trace.goal, axis=1)
     right.plot(steps, error, color="#1f6fb2", label="estimate to source")
