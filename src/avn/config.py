@@ -105,6 +105,9 @@ class EvalConfig(CoreConfig):
     seed: int = MISSING
     episodes: str = MISSING
     part: str = MISSING
+    # Films made of the run afterwards: how many, and of which episodes. They enter no hash.
+    film: int = 0
+    film_show: str = "typical"
 
 
 @dataclass

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from omegaconf import DictConfig
 
-from avn import evaluation
+from avn import evaluation, films
 from avn.cli import command
 from avn.stages import tell
 
@@ -15,8 +15,10 @@ from avn.stages import tell
 @command("eval")
 def main(cfg: DictConfig) -> Path:
     """Evaluate one row, or open its finished run, and print the table."""
+    films.check(cfg)
     folder = evaluation.evaluate(cfg)
     evaluation.show(cfg, folder)
+    films.make_films(cfg, folder)
     tell(str(folder))
     return folder
 

@@ -1,0 +1,210 @@
+"""Films of episodes: what the agent sees, hears and believes, a second for each action."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import imageio_ffmpeg
+import numpy as np
+import soundfile
+import torch
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+from torch import Tensor
+
+from avn.acoustics.dry_sounds import RATE
+from avn.errors import UserError
+from avn.modules.spectrogram import Spectrogram
+from avn.navigation.actions import HEADINGS
+from avn.navigation.trace import Trace
+from avn.reporting.sound_figures import draw_plan
+from avn.reporting.trajectory_figures import FRONT, draw_place, extent, outcome, plan_of, title_of
+from avn.stages import written_whole
+
+# Frames a second; a cursor runs over the spectrogram, and nothing else moves within a second.
+FPS = 5
+SIZE = (1280, 720)
+ACTIONS = ("forward", "backward", "turn left", "turn right", "Stop")
+_PATH, _HEARD = "#e0218a", "#1f6fb2"
+
+
+def write_film(
+    path: Path,
+    trace: Trace,
+    name: str,
+    views: NDArray[np.uint8],
+    clips: Tensor,
+    track: NDArray[np.float32],
+) -> None:
+    """Write a film of an episode of T actions as MP4, T + 1 seconds long.
+
+    Parameters
+    ----------
+    path : Path
+    trace : Trace
+    name : str
+        Of the run.
+    views : (T + 1, H, W, 3) uint8
+    clips : (T + 1, 2, 16000) float32 tensor
+        What is heard at each step, for the spectrogram.
+    track : (16000 (T + 1), 2) float32
+        The same as the film's sound; see `avn.perceived.soundtrack`.
+
+    Raises
+    ------
+    UserError
+        Where it cannot be encoded.
+    """
+    with written_whole(path) as part, tempfile.TemporaryDirectory() as folder:
+        wave = Path(folder) / "sound.wav"
+        soundfile.write(wave, track, RATE, subtype="PCM_16")
+        writer = imageio_ffmpeg.write_frames(
+            str(part),
+            SIZE,
+            fps=FPS,
+            codec="libx264",
+            quality=7,
+            audio_path=str(wave),
+            audio_codec="aac",
+            # the name that the file has while it is written does not tell its format
+            output_params=["-ar", "48000", "-b:a", "192k", "-movflags", "+faststart", "-f", "mp4"],
+        )
+        try:
+            writer.send(None)
+            for frame in frames(trace, name, views, clips):
+                writer.send(np.ascontiguousarray(frame))
+        except OSError as error:
+            reason = " ".join(str(error).split())[-200:]
+            raise UserError(f"{path}: the film cannot be encoded ({reason})") from error
+        finally:
+            writer.close()
+
+
+def frames(
+    trace: Trace, name: str, views: NDArray[np.uint8], clips: Tensor
+) -> Iterator[NDArray[np.uint8]]:
+    """The pictures of a film, (720, 1280, 3) uint8, `FPS` for each step."""
+    stage = _Stage(trace, name, views, clips)
+    for step in range(len(trace.state)):
+        picture = stage.draw(step)
+        for beat in range(FPS):
+            yield stage.with_cursor(picture, beat / FPS)
+
+
+class _Stage:
+    """The figure that every frame is drawn on."""
+
+    def __init__(self, trace: Trace, name: str, views: NDArray[np.uint8], clips: Tensor) -> None:
+        self.trace, self.views = trace, views
+        self.figure = Figure(figsize=(SIZE[0] / 100, SIZE[1] / 100), dpi=100, facecolor="white")
+        self.canvas = FigureCanvasAgg(self.figure)
+        self.view = self._panel(12, 258, 450, 450)
+        self.picture = self.view.imshow(views[0], interpolation="bicubic")
+        pictures = Spectrogram(scale="mel", frames=100, interaural=False)(clips)
+        self.pictures = torch.flip(pictures, dims=(2,)).numpy()  # low tones at the bottom
+        low, high = np.quantile(self.pictures, (0.02, 0.998))
+        self.ears = [self._panel(62, 136, 400, 104), self._panel(62, 22, 400, 104)]
+        self.sounds = []
+        for ear, (axes, word) in enumerate(zip(self.ears, ("left", "right"), strict=True)):
+            look: dict[str, Any] = {"aspect": "auto", "cmap": "magma", "vmin": low, "vmax": high}
+            self.sounds.append(axes.imshow(self.pictures[0, ear], **look))
+            axes.set_ylabel(f"{word} ear", fontsize=10)
+        self.map = self._panel(484, 60, 784, 560)
+        self._draw_map()
+        self.figure.text(484 / 1280, 690 / 720, f"{name}", fontsize=15, weight="bold", va="center")
+        self.figure.text(484 / 1280, 660 / 720, title_of(trace), fontsize=12, va="center")
+        self.caption = self.figure.text(484 / 1280, 630 / 720, "", fontsize=12, va="center")
+        self._legend()
+
+    def _panel(self, left: int, bottom: int, width: int, height: int) -> Axes:
+        """Axes without ticks at a place in pixels."""
+        (w, h) = SIZE
+        axes: Axes = self.figure.add_axes((left / w, bottom / h, width / w, height / h))
+        axes.set(xticks=[], yticks=[])
+        return axes
+
+    def _draw_map(self) -> None:
+        trace, axes = self.trace, self.map
+        thoughts = trace.thoughts
+        free = None if thoughts is None else thoughts.free
+        self.belief = None
+        if thoughts is not None and free is not None:
+            look: dict[str, Any] = {"cmap": "BrBG", "vmin": 0, "vmax": 255, "zorder": -1}
+            place = extent(thoughts.low, free.shape[1:])
+            self.belief = axes.imshow(free[0], origin="lower", extent=place, alpha=0.75, **look)
+        plan = plan_of(trace)
+        if self.belief is None or plan is None:
+            draw_place(axes, trace)
+        else:
+            draw_plan(axes, plan)
+            for piece in plan.furniture:
+                x0, y0, x1, y1 = piece.bounds
+                box = Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, ec="0.35", lw=0.7)
+                axes.add_patch(box)
+            for patch in axes.patches:
+                if patch.get_zorder() == 0:
+                    patch.set_visible(False)
+            axes.plot(*trace.goal, "*", color="#ffb000", mec="black", markersize=17, zorder=12)
+            axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
+        centres = trace.place.grid.centres
+        (x0, y0), (x1, y1) = centres.min(0) - 1.2, centres.max(0) + 1.2
+        axes.set(xlim=(x0, x1), ylim=(y0, y1))
+        (self.path,) = axes.plot([], [], color=_PATH, lw=2.6, zorder=9)
+        (self.bumps,) = axes.plot([], [], "x", color="black", markersize=6, zorder=10)
+        (self.nose,) = axes.plot([], [], color=_PATH, lw=3, zorder=10)
+        (self.agent,) = axes.plot([], [], "o", color="white", mec=_PATH, mew=3, ms=12, zorder=11)
+        (self.ray,) = axes.plot([], [], color=_HEARD, lw=1, ls=":", zorder=8)
+        (self.heard,) = axes.plot([], [], "P", color=_HEARD, mec="white", markersize=14, zorder=13)
+
+    def _legend(self) -> None:
+        words = ["star: the source"]
+        if self.trace.heard is not None:
+            words.append("blue cross: where it hears the source")
+        if self.belief is not None:
+            words.append("green: believed to be free, brown: blocked")
+        self.figure.text(484 / 1280, 34 / 720, "    ".join(words), fontsize=10, color="0.3")
+
+    def draw(self, step: int) -> NDArray[np.uint8]:
+        """The picture of one step, (720, 1280, 3) uint8."""
+        trace = self.trace
+        self.picture.set_data(self.views[step])
+        for ear, image in enumerate(self.sounds):
+            image.set_data(self.pictures[step, ear])
+        here = trace.path[step]
+        self.path.set_data(*trace.path[: step + 1].T)
+        self.bumps.set_data(*trace.path[: step + 1][trace.collided[: step + 1]].T)
+        front = FRONT[trace.state[step] % HEADINGS]
+        self.nose.set_data(*np.stack((here, here + 0.5 * front)).T)
+        self.agent.set_data(*here[:, None])
+        if trace.heard is not None:
+            self.heard.set_data(*trace.heard[step][:, None])
+            self.ray.set_data(*np.stack((here, trace.heard[step])).T)
+        if self.belief is not None and trace.thoughts is not None:
+            assert trace.thoughts.free is not None
+            self.belief.set_data(trace.thoughts.free[min(step, len(trace.action) - 1)])
+        self.caption.set_text(self._words(step))
+        self.canvas.draw()
+        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
+
+    def _words(self, step: int) -> str:
+        count = len(self.trace.action)
+        if step == count:
+            return outcome(self.trace)
+        bumped = " (ran into something)" if self.trace.collided[step] else ""
+        return f"action {step + 1} of {count}: {ACTIONS[self.trace.action[step]]}{bumped}"
+
+    def with_cursor(self, picture: NDArray[np.uint8], share: float) -> NDArray[np.uint8]:
+        """The same with a line where in the second it is, over both spectrograms."""
+        marked = picture.copy()
+        for axes in self.ears:
+            box = axes.get_window_extent()
+            column = int(box.x0 + share * box.width)
+            rows = slice(SIZE[1] - int(box.y1), SIZE[1] - int(box.y0))
+            marked[rows, column : column + 2] = 255
+        return marked
