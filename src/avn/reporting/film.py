@@ -24,7 +24,7 @@ from avn.modules.spectrogram import Spectrogram
 from avn.navigation.actions import HEADINGS
 from avn.navigation.trace import Trace
 from avn.reporting.sound_figures import draw_plan
-from avn.reporting.trajectory_figures import FRONT, draw_place, extent, outcome, plan_of, title_of
+from avn.reporting.trajectory_figures import draw_place, extent, outcome, plan_of, title_of
 from avn.stages import written_whole
 
 # Frames a second; a cursor runs over the spectrogram, and nothing else moves within a second.
@@ -72,6 +72,7 @@ def write_film(
             quality=7,
             audio_path=str(wave),
             audio_codec="aac",
+            ffmpeg_log_level="error",
             # the name that the file has while it is written does not tell its format
             output_params=["-ar", "48000", "-b:a", "192k", "-movflags", "+faststart", "-f", "mp4"],
         )
@@ -157,8 +158,7 @@ class _Stage:
         axes.set(xlim=(x0, x1), ylim=(y0, y1))
         (self.path,) = axes.plot([], [], color=_PATH, lw=2.6, zorder=9)
         (self.bumps,) = axes.plot([], [], "x", color="black", markersize=6, zorder=10)
-        (self.nose,) = axes.plot([], [], color=_PATH, lw=3, zorder=10)
-        (self.agent,) = axes.plot([], [], "o", color="white", mec=_PATH, mew=3, ms=12, zorder=11)
+        (self.agent,) = axes.plot([], [], color="white", mec=_PATH, mew=2.5, ms=18, zorder=11)
         (self.ray,) = axes.plot([], [], color=_HEARD, lw=1, ls=":", zorder=8)
         (self.heard,) = axes.plot([], [], "P", color=_HEARD, mec="white", markersize=14, zorder=13)
 
@@ -179,9 +179,9 @@ class _Stage:
         here = trace.path[step]
         self.path.set_data(*trace.path[: step + 1].T)
         self.bumps.set_data(*trace.path[: step + 1][trace.collided[: step + 1]].T)
-        front = FRONT[trace.state[step] % HEADINGS]
-        self.nose.set_data(*np.stack((here, here + 0.5 * front)).T)
         self.agent.set_data(*here[:, None])
+        # a triangle that points where it looks, 0 degrees to the north and counter-clockwise
+        self.agent.set_marker((3, 0, -90.0 * (trace.state[step] % HEADINGS)))
         if trace.heard is not None:
             self.heard.set_data(*trace.heard[step][:, None])
             self.ray.set_data(*np.stack((here, trace.heard[step])).T)
