@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from multiprocessing.connection import Connection, wait
 from typing import Any, Protocol
 
@@ -57,13 +57,14 @@ class SpawnedCrew:
     Raises
     ------
     UserError
-        In `round`, where a worker dies; the others are ended.
+        Here and in `round`, where a worker dies; the others are ended.
     """
 
     def __init__(self, task: Task, shared: SharedState, states: list[dict[str, Any]]) -> None:
         context, count = mp.get_context("spawn"), task.recipe.workers
         task.tables.share()
-        locks = _locks(context, task.recipe.order, count)
+        # kept, for a semaphore that nobody holds is gone before its process opens it
+        self._locks = locks = _locks(context, task.recipe.order, count)
         self._links: list[Connection] = []
         self._processes = []
         for rank in range(count):
@@ -77,11 +78,14 @@ class SpawnedCrew:
             theirs.close()
             self._links.append(ours)
             self._processes.append(process)
+        for rank in range(count):  # all begin with the same weights, whoever is up first
+            self._report(rank)
 
     def round(self, updates: int, progress: Callable[[], None]) -> list[Report]:
         """Let every worker make so many updates."""
         for link in self._links:
-            link.send(updates)
+            with suppress(OSError):  # of a dead worker, which its report tells
+                link.send(updates)
         reports: dict[int, Report] = {}
         while len(reports) < len(self._links):
             progress()
@@ -92,7 +96,7 @@ class SpawnedCrew:
         progress()
         return [reports[rank] for rank in range(len(self._links))]
 
-    def _report(self, rank: int) -> Report:
+    def _report(self, rank: int) -> Any:
         try:
             kind, found = self._links[rank].recv()
         except (EOFError, ConnectionError):
@@ -149,6 +153,7 @@ def _work(
         worker = Worker(rank, task, shared, turn)
         if state is not None:
             worker.load_state_dict(state)
+        link.send(("done", None))
         while True:
             figures = worker.round(link.recv())
             link.send(("done", (figures, worker.state_dict())))

@@ -1,0 +1,151 @@
+import pytest
+import torch
+from rl.conftest import make_task, make_walks, make_worker, random_tables
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs.utils import check_env_specs
+
+from avn.errors import UserError
+from avn.rl.collectors import LeanCollector, TorchrlCollector
+from avn.rl.environment import WalkEnv
+from avn.rl.policy import Policy, Resolving
+from avn.rl.starts import build_starts
+from avn.rl.world import World
+
+ALL = ("feature", "sound_feature", "collided", "odometry", "map")
+
+
+def make_env(tables, rules, n=6, seed=0, **options) -> WalkEnv:
+    observes = options.pop("observes", ALL)
+    options = {"map_size": 41, "map_width": 11} | options
+    return WalkEnv(World(tables, build_starts(tables), n, rules, 9, seed=seed), observes, **options)
+
+
+@pytest.mark.parametrize("resolved", [True, False])
+@pytest.mark.parametrize("memory", [0, 4])
+def test_the_environment_keeps_to_its_specs(flat, rules, resolved, memory):
+    tables = random_tables([flat], rules)
+    check_env_specs(make_env(tables, rules, memory=memory, resolved=resolved))
+
+
+def test_specs_say_shapes_and_ranges(flat, rules):
+    tables = random_tables([flat], rules)
+    env = make_env(tables, rules, resolved=False)
+    assert env.action_spec.space.n == 4
+    state = env.observation_spec["index", "state"]
+    assert (int(state.space.low.min()), int(state.space.high.max())) == (0, tables.states - 1)
+    assert env.observation_spec["map"].shape == (6, 1, 11, 11)
+    assert float(env.observation_spec["map"].space.high.max()) == 1.0
+    assert env.observation_spec["odometry"].dtype == torch.int64
+
+
+def test_an_observation_that_is_not_there_is_refused_by_name(flat, rules):
+    tables = random_tables([flat], rules)
+    with pytest.raises(UserError, match="observes: 'smell'"):
+        make_env(tables, rules, observes=("smell",))
+
+
+def test_only_rows_whose_episode_ended_begin_anew(flat, rules):
+    env = make_env(random_tables([flat], rules), rules)
+    first = env.reset()
+    for step in range(9):
+        first["action"] = torch.full((6,), 2)
+        both, after = env.step_and_maybe_reset(first)
+        ended = both["next", "done"][:, 0]
+        assert bool(ended.all()) == (step == 8)
+        kept = torch.equal(after["odometry"], both["next", "odometry"])
+        assert kept != bool(ended.all()) or step == 8
+        assert torch.equal(after["is_init"], both["next", "done"])
+        first = after
+    assert not first["odometry"].any()
+
+
+class Spy(TensorDictModuleBase):
+    """Says what it was shown."""
+
+    def __init__(self, in_keys):
+        super().__init__()
+        self.in_keys, self.out_keys, self.shown = list(in_keys), ["action"], []
+
+    def forward(self, tensordict):
+        self.shown.append(tensordict.clone())
+        return tensordict.set("action", torch.zeros(tensordict.batch_size, dtype=torch.int64))
+
+
+def test_a_policy_is_shown_features_and_never_a_number(flat, rules):
+    tables = random_tables([flat], rules)
+    env = make_env(tables, rules, observes=("feature", "sound_feature", "map"), resolved=False)
+    spy = Spy(["feature", "sound_feature", "map"])
+    env.rollout(5, Resolving(env.features, spy), break_when_any_done=False)
+    for shown in spy.shown:
+        assert set(shown.keys(include_nested=True, leaves_only=True)) == set(spy.in_keys)
+        assert all(value.is_floating_point() for value in shown.values())
+    numbers = env.rollout(1)["index"][:, 0]
+    expected = tables.sights["feature"][numbers["state"]]
+    features = env.features(numbers["state"], numbers["clip"])
+    assert torch.equal(features["feature"], expected)
+
+
+def test_resolved_observations_are_those_that_the_numbers_stand_for(flat, rules):
+    tables = random_tables([flat], rules)
+    near, far = (make_env(tables, rules, resolved=r, seed=4) for r in (True, False))
+    shown, numbers = near.reset(), far.reset()
+    found = far.features(numbers["index", "state"], numbers["index", "clip"])
+    for name in ("feature", "sound_feature"):
+        assert torch.equal(shown[name], found[name])
+
+
+@pytest.mark.parametrize("memory", [0, 4])
+@pytest.mark.parametrize("maps", [0, 2])
+def test_both_collectors_give_the_same_batches(flat, rules, memory, maps):
+    tables = random_tables([flat], rules)
+    walks = make_walks(tables) if memory else None
+    maps = min(maps, 2 if memory else 1)
+    batches = []
+    for collector in (LeanCollector, TorchrlCollector):
+        task = make_task(tables, rules, walks=walks, memory=memory, maps=maps)
+        worker = make_worker(task)
+        policy = Policy(worker.network, torch.Generator().manual_seed(7))
+        gathering = collector(worker.env, policy, steps=5)
+        batches.append([gathering.collect().clone() for _ in range(6)])
+    lean, torchrl = batches
+    for one, other in zip(lean, torchrl, strict=True):
+        assert one.batch_size == other.batch_size == (6, 5)
+        for key in one.keys(include_nested=True, leaves_only=True):
+            assert torch.equal(one[key], other[key]), key
+        assert one["next", "done"].any() or one["is_init"].any() or one is not lean[0]
+    assert any(bool(batch["next", "terminated"].any()) for batch in lean)
+    assert any(bool(batch["next", "truncated"].any()) for batch in lean)
+
+
+def test_the_map_is_that_of_where_the_agent_has_been_and_begins_unknown(flat, rules):
+    tables = random_tables([flat], rules)
+    tables.sights["window"][:] = torch.nan  # nothing is seen: only what it stands on and runs into
+    env = make_env(tables, rules, n=1, observes=("map",))
+    east = 1
+    env.world.state = env.world.start = torch.tensor([4 * 2 + east])
+    env._map.reset(torch.tensor([True]))
+    env._around = env._look_around(None)
+    assert env.look()["map"].unique().tolist() == [0.5, 1.0]  # it stands somewhere
+    env.move(torch.tensor([0]))
+    around = env.look()["map"][0, 0]
+    assert around[5, 5] == 1.0
+    assert around[4, 5] == 1.0
+    assert int((around != 0.5).sum()) == 2
+    env.move(torch.tensor([3]))  # to the right: what was behind is now to its right
+    around = env.look()["map"][0, 0]
+    assert around[5, 5] == 1.0
+    assert around[5, 6] == 1.0
+    env.begin(torch.tensor([True]))
+    assert int((env.look()["map"] != 0.5).sum()) == 1
+
+
+def test_the_batch_axes_are_episodes_and_steps(flat, rules):
+    tables = random_tables([flat], rules)
+    batch = make_worker(make_task(tables, rules)).collector.collect()
+    assert isinstance(batch, TensorDict)
+    done = batch["next", "done"][:, :-1, 0]
+    assert torch.equal(batch["is_init"][:, 1:, 0], done)
+    going = ~done
+    following = batch["index", "state"][:, 1:]
+    assert torch.equal(following[going], batch["next", "index", "state"][:, :-1][going])

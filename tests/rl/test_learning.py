@@ -1,0 +1,95 @@
+"""A3C learns what there is to learn: the shortest way, and to remember."""
+
+import torch
+from rl.conftest import make_task, make_worker
+
+from avn.navigation.distances import fewest_actions
+from avn.navigation.place import draw
+from avn.navigation.protocols import Protocol
+from avn.rl.config import RewardConfig
+from avn.rl.starts import Starts
+from avn.rl.tables import build_tables
+
+RULES = Protocol("var", "box", False, "attempted", moves_factor=2.0)
+LEARN = {"episodes": 16, "steps": 10, "lr": 3e-3, "eps": 1e-5, "schedule": "constant", "width": 32}
+
+
+def one_hot_tables(place, hearing=None):
+    """Every state looks like no other."""
+    states = 4 * len(place.grid.lattice)
+    heard = [] if hearing is None else [{"sound_feature": hearing}]
+    return build_tables([place], RULES, heard, [{"feature": torch.eye(states)}])
+
+
+def learned(task, updates):
+    worker = make_worker(task)
+    for _ in range(updates):
+        worker.update()
+    return worker
+
+
+def test_a_corridor_is_solved_to_the_optimal_return():
+    place = draw("corridor", "aaaaaaaA")
+    tables = one_hot_tables(place)
+    reward = RewardConfig(step=-0.5, collision=-0.5)  # so that an action more is worth avoiding
+    options = {"inputs": ("feature",), "max_steps": 40, "reward": reward, "gamma": 0.9}
+    worker = learned(make_task(tables, RULES, **(LEARN | options)), 800)
+    goal = tables.goal.reshape(1, -1)[:, ::4].numpy()
+    optimum = fewest_actions(place.grid.neighbours, goal, 8)[8, 0]
+    world, network = worker.env.world, worker.network
+    starts = torch.arange(tables.states)[~tables.goal]
+    state, earned, done = starts.clone(), torch.zeros(len(starts)), starts < 0
+    for _ in range(20):
+        with torch.no_grad():
+            action = network.actor(network.embed({"feature": torch.eye(tables.states)[state]}))
+        world.state, world.source = state, torch.zeros_like(state)
+        world.n, world.actions, world.attempted = len(state), state * 0, state * 0
+        reward, terminated, _ = world.step(action.argmax(dim=1))
+        earned += torch.where(done, 0.0, reward)
+        done |= terminated
+        state = world.state
+    expected = 10.0 - 0.5 * (torch.from_numpy(optimum)[starts] - 1)
+    assert done.all()
+    assert torch.allclose(earned, expected.float(), atol=1e-4)
+
+
+T_MAZE = """
+AaaaaaA
+...a...
+...a...
+...a...
+"""
+
+
+def t_maze_success(memory: int) -> float:
+    """Success in a maze whose cue, left or right, is heard at the start alone."""
+    place = draw("t_maze", T_MAZE)
+    states = 4 * len(place.grid.lattice)
+    lattice = place.grid.lattice.tolist()
+    start = 4 * lattice.index([3, 0])  # at the foot, facing north
+    cue = torch.zeros(2, states, 1, 1, 1)
+    left = place.grid.lattice[place.sources][:, 0] < 3
+    cue[:, start, 0, 0, 0] = torch.where(torch.from_numpy(left), -1.0, 1.0)
+    tables = one_hot_tables(place, cue)
+    # three moves, a turn and two moves arrive; a wrong turn does not leave enough
+    task = make_task(tables, RULES, memory=memory, max_steps=8, **(LEARN | {"entropy": 0.02}))
+    worker = make_worker(task)
+    worker.env.world.starts = Starts(
+        1, torch.tensor([start, start]), torch.tensor([0, 1]), torch.tensor([1, 1])
+    )
+    worker.env.begin(torch.ones(16, dtype=torch.bool))
+    worker.collector.restart()
+    for _ in range(900):
+        worker.update()
+    worker._scores.figures()
+    for _ in range(60):
+        worker._scores.take(worker.collector.collect())
+    return worker._scores.figures()["success"]
+
+
+def test_a_t_maze_whose_cue_lies_in_the_past_is_solved_with_memory():
+    assert t_maze_success(memory=16) > 0.9
+
+
+def test_and_not_without_memory():
+    assert t_maze_success(memory=0) < 0.65
