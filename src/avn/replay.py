@@ -147,10 +147,8 @@ def same_episodes(run: Run, labels: Sequence[int], other: Run) -> list[int]:
     UserError
         Where the other run did not walk them.
     """
-    keys = ["room", "sound", "seed", "episode", "source", "start_cell", "start_heading"]
-    own = _rows(other.episodes[keys])
-    where = {tuple(row): i for i, row in zip(other.episodes.index, own, strict=True)}
-    wanted = [tuple(row) for row in _rows(run.episodes.loc[list(labels), keys])]
+    where = dict(zip(episode_keys(other.episodes), other.episodes.index, strict=True))
+    wanted = episode_keys(run.episodes.loc[list(labels)])
     if not set(wanted) <= set(where):
         raise UserError(
             f"{other.folder}: walked other episodes than {run.folder}; give runs with the same "
@@ -159,8 +157,10 @@ def same_episodes(run: Run, labels: Sequence[int], other: Run) -> list[int]:
     return [int(where[row]) for row in wanted]
 
 
-def _rows(frame: pd.DataFrame) -> list[list[Any]]:
-    return [list(row) for row in frame.itertuples(index=False)]
+def episode_keys(episodes: pd.DataFrame) -> list[tuple[Any, ...]]:
+    """What tells which episode a record is of, whoever walked it."""
+    keys = ["room", "sound", "seed", "episode", "source_cell", "start_cell", "start_heading"]
+    return [tuple(row) for row in episodes[keys].itertuples(index=False)]
 
 
 def names_of(runs: Sequence[Run]) -> list[str]:

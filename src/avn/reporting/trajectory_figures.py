@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import CELL, FloorPlan
 from avn.navigation.actions import HEADINGS
+from avn.navigation.place import Place
 from avn.navigation.trace import Trace
 from avn.reporting.floor_plan_figure import draw_floor_plan
 
@@ -28,16 +29,22 @@ def plan_of(trace: Trace) -> FloorPlan | None:
 
 
 def draw_place(axes: Axes, trace: Trace) -> None:
-    """Draw a trace's apartment faintly, in metres: floor plan, or cells alone, and the source."""
-    plan = plan_of(trace)
+    """Draw a trace's apartment faintly, in metres, and the source."""
+    draw_apartment(axes, trace.place)
+    axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=15, zorder=12)
+
+
+def draw_apartment(axes: Axes, place: Place) -> None:
+    """Draw an apartment faintly, in metres: its floor plan, or its cells where it has none."""
+    plan: FloorPlan | None = getattr(place, "plan", None)
     if plan is None:
-        for x, y in trace.place.grid.centres:
+        for x, y in place.grid.centres:
             corner = (x - CELL / 2, y - CELL / 2)
             axes.add_patch(Rectangle(corner, CELL, CELL, color="#f2efe8", zorder=0))
         axes.set_aspect("equal")
         axes.autoscale_view()
     else:
-        draw_floor_plan(axes, plan, trace.place.grid)
+        draw_floor_plan(axes, plan, place.grid)
         for line in list(axes.lines):  # cells, edges and all sources would hide the walks
             line.remove()
         for text in list(axes.texts):
@@ -50,7 +57,6 @@ def draw_place(axes: Axes, trace: Trace) -> None:
     axes.set(title="", xticks=[], yticks=[])
     for spine in axes.spines.values():
         spine.set_visible(False)
-    axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=15, zorder=12)
 
 
 def draw_walk(

@@ -1,0 +1,173 @@
+"""`python -m avn.report RUN [RUN...]`: one HTML file with results, episodes, views and sound.
+
+The file holds all that it shows, and works without a network.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from avn import replay
+from avn.cli import plainly
+from avn.errors import UserError
+from avn.perceived import Perceived, soundtrack
+from avn.replay import Run
+from avn.reporting import page, page_media
+from avn.reporting.breakdown import breakdown_figure
+from avn.stages import digest, stage_folder, tell, written_whole
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the page that the command line asks for; gives the exit code."""
+    return plainly("avn.report", lambda: _report(_parse(arguments)))
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser("python -m avn.report", description=__doc__)
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="folders of runs")
+    parser.add_argument(
+        "--episodes",
+        type=int,
+        default=1,
+        metavar="N",
+        help="episodes of each room and sound with views and sound, 0 for none (1)",
+    )
+    parser.add_argument("--show", default="typical", help=f"which: {', '.join(replay.SHOWS)}")
+    parser.add_argument("--output", type=Path, help="the file (outputs/report/report-<hash8>.html)")
+    return parser.parse_args(arguments)
+
+
+def _report(options: argparse.Namespace) -> None:
+    if options.episodes < 0:
+        raise UserError(f"--episodes: {options.episodes} is less than 0")
+    runs = [replay.open_run(folder) for folder in options.runs]
+    folders = [run.folder.resolve() for run in runs]
+    if len(set(folders)) < len(folders):
+        raise UserError("RUN: a folder is given twice; name each run once")
+    html = build(runs, options.episodes, options.show)
+    asked = ([str(path) for path in folders], options.episodes, options.show)
+    default = stage_folder(runs[0].cfg.outputs, "report", "report", digest(*asked))
+    output: Path = options.output or default.with_name(default.name + ".html")
+    try:
+        with written_whole(output) as part:
+            part.write_text(html, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"--output: {output}: {error.strerror}; choose another place") from error
+    tell(f"{len(html) / 1e6:.1f} MB")
+    tell(str(output))
+
+
+def build(runs: Sequence[Run], count: int, show: str) -> str:
+    """The page of some runs as HTML.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    count : int
+        Episodes of each room and sound that are embedded with views and sound.
+    show : {"typical", "success", "failure"}
+        Which; as `avn.replay.choose`, of the first run, and the same ones of the others.
+    """
+    names = replay.names_of(runs)
+    media = _Media()
+    pages = []
+    for index, (run, labels) in enumerate(zip(runs, _chosen(runs, count, show), strict=True)):
+        if labels:
+            tell(f"{run.folder}: walking {len(labels)} episodes again")
+        embedded = media.add(run, index, labels) if labels else {}
+        pages.append(
+            page.PageRun(
+                name=names[index],
+                folder=str(run.folder),
+                settings=_settings(run),
+                privileged=bool(run.cfg.agent.privileged),
+                results=run.results,
+                episodes=run.episodes,
+                media=embedded,
+            )
+        )
+    by_name = dict(zip(names, (run.episodes for run in runs), strict=True))
+    figure = page_media.figure_url(breakdown_figure(by_name))
+    title = " · ".join(dict.fromkeys(str(run.cfg.agent.name) for run in runs))
+    return page.render(
+        f"Runs of {title}", pages, media.plans, media.views, media.with_twins(), figure
+    )
+
+
+def _chosen(runs: Sequence[Run], count: int, show: str) -> Iterator[list[int]]:
+    """Rows of each run to embed: of each room and sound the same episodes where runs share them."""
+    chosen: set[tuple[Any, ...]] = set()
+    for run in runs:
+        keys = dict(zip(run.episodes.index, replay.episode_keys(run.episodes), strict=True))
+        labels: list[int] = []
+        for _, part in run.episodes.groupby(["room", "sound"], sort=False):
+            shared = [int(label) for label in part.index if keys[label] in chosen]
+            labels += (shared or replay.choose(part, show, count))[:count]
+        chosen |= {keys[label] for label in labels}
+        yield labels
+
+
+def _settings(run: Run) -> str:
+    cfg = run.cfg
+    parts = {key: cfg[key].name for key in ("protocol", "acoustics", "split", "mapper", "planner")}
+    parts |= {key: cfg[key] for key in ("look", "exploration", "localisation", "part", "episodes")}
+    parts |= {"seed": cfg.seed, "train_seed": cfg.train_seed}
+    return ", ".join(f"{key}={value}" for key, value in parts.items())
+
+
+class _Media:
+    """Plans, views and episodes that are embedded, each once."""
+
+    def __init__(self) -> None:
+        self.plans: list[dict[str, Any]] = []
+        self.views: list[str] = []
+        self._episodes: list[dict[str, Any]] = []
+        self._keys: list[tuple[Any, ...]] = []
+        self._plan_of: dict[str, int] = {}
+        self._view_of: dict[tuple[str, str, int], int] = {}
+
+    def add(self, run: Run, index: int, labels: Sequence[int]) -> dict[int, int]:
+        """Embed episodes of a run; gives the number of each."""
+        perceived = Perceived(run)
+        traces = replay.traces(run, labels)
+        keys = replay.episode_keys(run.episodes.loc[list(labels)])
+        numbers = {}
+        for label, key, trace in zip(labels, keys, traces, strict=True):
+            place = str(getattr(trace.place, "folder", trace.place.name))
+            if place not in self._plan_of:
+                self._plan_of[place] = len(self.plans)
+                self.plans.append(page_media.plan_of_place(trace.place))
+            own = page_media.episode_media(trace, soundtrack(perceived.clips(trace)))
+            own |= {"run": index, "plan": self._plan_of[place]}
+            renderer = (place, str(run.cfg.renderer.name))
+            own["views"] = [self._view(perceived, trace, *renderer, int(s)) for s in trace.state]
+            numbers[int(label)] = len(self._episodes)
+            self._episodes.append(own)
+            self._keys.append((place, *key))
+        return numbers
+
+    def _view(self, perceived: Perceived, trace: Any, place: str, name: str, state: int) -> int:
+        key = (place, name, state)
+        if key not in self._view_of:
+            self._view_of[key] = len(self.views)
+            (view,) = perceived.views(trace.place.name, [state])
+            self.views.append(page_media.view_url(view))
+        return self._view_of[key]
+
+    def with_twins(self) -> list[dict[str, Any]]:
+        """The episodes, each with the numbers of those of all runs that are the same."""
+        twins: dict[tuple[Any, ...], list[int]] = {}
+        for number, key in enumerate(self._keys):
+            twins.setdefault(key, []).append(number)
+        return [
+            {**own, "twins": twins[key]}
+            for own, key in zip(self._episodes, self._keys, strict=True)
+        ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,202 @@
+"use strict";
+(() => {
+  const read = (id) => JSON.parse(document.getElementById(id).textContent);
+  const at = (id) => document.getElementById(id);
+  const data = read("data");
+  const ACTIONS = ["forward", "backward", "turn left", "turn right", "Stop"];
+  const HEADINGS = ["north", "east", "south", "west"];
+  let views = null; // read when the first episode is opened
+  let shown = null;
+
+  // A click or Enter on a heading sorts, on a cell or an episode opens it.
+  document.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    if (event.target.matches("th[tabindex], td[tabindex], tr[tabindex]")) {
+      event.preventDefault();
+      event.target.click();
+    }
+  });
+
+  document.querySelectorAll("input[name=by]").forEach((choice) =>
+    choice.addEventListener("change", () =>
+      at("results").querySelectorAll("td.cell").forEach((cell) => {
+        cell.dataset.sort = cell.dataset[choice.value];
+      })));
+
+  at("results").addEventListener("click", (event) => {
+    const cell = event.target.closest("td.cell");
+    if (cell) list(cell);
+  });
+
+  function list(cell) {
+    document.querySelectorAll("td.chosen").forEach((other) => other.classList.remove("chosen"));
+    cell.classList.add("chosen");
+    const { run, sound, room } = cell.dataset;
+    const own = data.runs[run];
+    const rows = own.episodes.filter((row) =>
+      (room === data.average || row[0] === room) && (sound === data.all || row[1] === sound));
+    at("episodes-title").textContent =
+      `${own.name}, ${sound}, ${room.replaceAll("_", " ")}: ${rows.length} episodes`;
+    const body = at("episode-list").tBodies[0];
+    body.replaceChildren(...rows.map((row) => line(row)));
+    at("episode-list").querySelectorAll("th").forEach((th) => th.removeAttribute("aria-sort"));
+    at("episodes").hidden = false;
+    at("episodes").scrollIntoView({ block: "start" });
+  }
+
+  function line(row) {
+    const [room, sound, number, metres, sight, doors, outcome, spl, actions, media] = row;
+    const tr = document.createElement("tr");
+    const texts = [media === null ? "" : "\u266B", room.replaceAll("_", " "), sound, number,
+      metres.toFixed(1), sight ? "in sight" : "out of sight", doors,
+      outcome.replaceAll("_", " "), spl.toFixed(2), actions];
+    texts.forEach((text, index) => {
+      const td = document.createElement("td");
+      td.textContent = text;
+      if (![0, 1, 2, 5, 7].includes(index)) td.className = "number";
+      if (index === 0) td.dataset.sort = media === null ? 1 : 0;
+      tr.append(td);
+    });
+    tr.className = media === null ? "closed" : "open";
+    if (media !== null) {
+      tr.tabIndex = 0;
+      tr.dataset.media = media;
+    }
+    return tr;
+  }
+
+  at("episode-list").addEventListener("click", (event) => {
+    const row = event.target.closest("tr.open");
+    if (row) {
+      open(Number(row.dataset.media));
+      at("episode").scrollIntoView({ block: "start" });
+    }
+  });
+
+  function open(media) {
+    views = views ?? read("views");
+    const own = read(`episode-${media}`);
+    const plan = data.plans[own.plan];
+    shown = { media, own, plan, others: own.twins.filter((twin) => twin !== media) };
+    at("episode").hidden = false;
+    at("episode-title").textContent = own.title;
+    at("twins").replaceChildren(...own.twins.map(choose));
+    at("plan-image").src = plan.image;
+    at("drawing").setAttribute("viewBox", `0 0 ${plan.width} ${plan.height}`);
+    at("belief-choice").hidden = !own.belief;
+    shown.belief = own.belief &&
+      Uint8Array.from(atob(own.belief.free), (letter) => letter.charCodeAt(0));
+    at("step").max = own.path.length - 1;
+    at("sound").src = own.sound;
+    shown.ghosts = shown.others.map((twin) => read(`episode-${twin}`));
+    step(0);
+  }
+
+  function choose(media) {
+    const own = media === shown.media ? shown.own : read(`episode-${media}`);
+    const button = document.createElement("button");
+    const swatch = document.createElement("i");
+    swatch.className = "swatch";
+    swatch.style.background = data.runs[own.run].colour;
+    button.append(swatch, `${data.runs[own.run].name}: ${own.outcome}`);
+    button.setAttribute("aria-pressed", String(media === shown.media));
+    button.addEventListener("click", () => open(media));
+    return button;
+  }
+
+  // Metres east and north of the plan's corner become units of the drawing, south at the bottom.
+  const spot = ([x, y]) => [x - shown.plan.left, shown.plan.top - y];
+
+  function svg(tag, attributes) {
+    const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
+    Object.entries(attributes).forEach(([key, value]) => node.setAttribute(key, value));
+    return node;
+  }
+
+  function way(path, colour, width) {
+    const points = path.map((place) => spot(place).join(",")).join(" ");
+    return svg("polyline", { points, fill: "none", stroke: colour, "stroke-width": width,
+      "stroke-linejoin": "round", "stroke-linecap": "round" });
+  }
+
+  function step(index) {
+    const { own } = shown;
+    shown.step = index;
+    at("step").value = index;
+    at("view").src = views[own.views[index]];
+    const [x, y, heading] = own.path[index];
+    const last = own.path.length - 1;
+    const bump = own.collided[index] ? ", ran into something" : "";
+    const next = index === last ? own.outcome : `next: ${ACTIONS[own.action[index]]}`;
+    at("caption").textContent =
+      `step ${index} of ${last}, facing ${HEADINGS[heading]}${bump}; ${next}`;
+    const colour = data.runs[own.run].colour;
+    const marks = shown.ghosts.map((ghost) => way(ghost.path, data.runs[ghost.run].colour, 0.03));
+    marks.push(way(own.path, colour, 0.03), way(own.path.slice(0, index + 1), colour, 0.09));
+    const [ax, ay] = spot([x, y]);
+    if (own.heard) {
+      const [hx, hy] = spot(own.heard[index]);
+      marks.push(svg("line", { x1: ax, y1: ay, x2: hx, y2: hy, stroke: "#1f6fb2",
+        "stroke-width": 0.03, "stroke-dasharray": "0.08 0.08" }));
+      marks.push(svg("path", { d: "M-.2 0H.2M0-.2V.2", stroke: "#1f6fb2", "stroke-width": 0.11,
+        transform: `translate(${hx} ${hy})`, id: "heard" }));
+    }
+    const [gx, gy] = spot(own.goal);
+    const star = [...Array(10).keys()].map((corner) => {
+      const angle = Math.PI * corner / 5;
+      const far = corner % 2 ? 0.1 : 0.25;
+      return `${gx + far * Math.sin(angle)},${gy - far * Math.cos(angle)}`;
+    });
+    marks.push(svg("polygon", { points: star.join(" "), fill: "#ffb000", stroke: "black",
+      "stroke-width": 0.02 }));
+    marks.push(svg("polygon", { points: "0,-.27 .2,.2 -.2,.2", fill: "white", stroke: colour,
+      "stroke-width": 0.07, transform: `translate(${ax} ${ay}) rotate(${90 * heading})`,
+      id: "agent" }));
+    at("drawing").replaceChildren(...marks);
+    believe(index);
+  }
+
+  function believe(index) {
+    const { own, plan, belief } = shown;
+    const canvas = at("belief");
+    canvas.hidden = !belief || !at("show-belief").checked;
+    if (canvas.hidden) return;
+    const { width, height, left, top } = own.belief;
+    const size = width * height;
+    const from = Math.min(index, own.action.length - 1) * size;
+    [canvas.width, canvas.height] = [width, height];
+    const image = new ImageData(width, height);
+    for (let row = 0; row < height; row += 1) {
+      for (let column = 0; column < width; column += 1) {
+        const free = belief[from + (height - 1 - row) * width + column] / 255 - 0.5;
+        const [r, g, b] = free > 0 ? [0, 121, 107] : [140, 81, 10];
+        image.data.set([r, g, b, Math.min(255, Math.abs(free) * 510)], 4 * (row * width + column));
+      }
+    }
+    canvas.getContext("2d").putImageData(image, 0, 0);
+    Object.assign(canvas.style, {
+      left: `${100 * (left - plan.left) / plan.width}%`,
+      top: `${100 * (plan.top - top) / plan.height}%`,
+      width: `${50 * width / plan.width}%`, // squares of half a metre
+      height: `${50 * height / plan.height}%`,
+    });
+  }
+
+  const within = (index) => Math.max(0, Math.min(index, shown.own.path.length - 1));
+  function go(index) {
+    step(within(index));
+    at("sound").currentTime = within(index) + 0.001;
+  }
+  at("step").addEventListener("input", () => go(Number(at("step").value)));
+  at("back").addEventListener("click", () => go(shown.step - 1));
+  at("on").addEventListener("click", () => go(shown.step + 1));
+  at("show-belief").addEventListener("change", () => believe(shown.step));
+  function follow() {
+    if (!shown) return;
+    const now = within(Math.floor(at("sound").currentTime));
+    if (now !== shown.step) step(now);
+    if (!at("sound").paused) requestAnimationFrame(follow);
+  }
+  at("sound").addEventListener("play", follow);
+  at("sound").addEventListener("seeked", follow);
+})();
