@@ -10,7 +10,8 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from avn.reporting.results import ALL_SOUNDS, AVERAGE
+from avn.errors import UserError
+from avn.reporting.results import ALL_SOUNDS, AVERAGE, compare
 from avn.reporting.table import PAPER, PAPER_PROTOCOL, paper_table
 from avn.reporting.trajectory_figures import RUN_COLOURS
 
@@ -90,6 +91,7 @@ def render(
         views=list(views),
         episodes=list(episodes),
         breakdown=breakdown,
+        differences=_differences(runs),
         licence="sortable-tablesort by Jonas Earendel, public domain (Unlicense)",
         # our own files, which must not be escaped within their elements
         **{
@@ -139,6 +141,19 @@ def _rows(index: int, run: PageRun, rooms: Sequence[str]) -> list[dict[str, Any]
                 "cells": cells,
             }
         )
+    return rows
+
+
+def _differences(runs: Sequence[PageRun]) -> list[dict[str, Any]]:
+    """How much better each run is than the first, where both walked the same episodes."""
+    rows = []
+    for run in runs[1:]:
+        try:
+            table = compare(run.episodes, runs[0].episodes).set_index("figure")
+        except UserError:
+            continue
+        points = 100 * table.loc[["sr", "spl"], ["difference", "low", "high"]].to_numpy()
+        rows.append({"name": run.name, "sr": points[0].tolist(), "spl": points[1].tolist()})
     return rows
 
 

@@ -82,6 +82,7 @@ def episode_media(trace: Trace, track: NDArray[np.float32]) -> dict[str, Any]:
         "collided": trace.collided.astype(int).tolist(),
         "heard": None if trace.heard is None else _rounded(trace.heard),
         "belief": _belief(trace),
+        "memory": _memory(trace),
         "sound": sound_url(track),
     }
 
@@ -99,6 +100,15 @@ def _belief(trace: Trace) -> dict[str, Any] | None:
         "height": height,
         "free": base64.b64encode(thoughts.free.tobytes()).decode("ascii"),
     }
+
+
+def _memory(trace: Trace) -> dict[str, Any] | None:
+    """The walk that an agent remembers, and the places that its memory returned."""
+    thoughts = trace.thoughts
+    if thoughts is None or thoughts.retrieved is None or trace.walk is None:
+        return None
+    walk = trace.place.grid.centres[trace.walk // HEADINGS]
+    return {"walk": _rounded(walk), "entries": _rounded(thoughts.retrieved[..., :2])}
 
 
 def _rounded(values: NDArray[np.float64]) -> list[Any]:

@@ -35,6 +35,7 @@
     const own = data.runs[run];
     const rows = own.episodes.filter((row) =>
       (room === data.average || row[0] === room) && (sound === data.all || row[1] === sound));
+    rows.sort((one, other) => (one[9] === null) - (other[9] === null)); // playable ones first
     at("episodes-title").textContent =
       `${own.name}, ${sound}, ${room.replaceAll("_", " ")}: ${rows.length} episodes`;
     const body = at("episode-list").tBodies[0];
@@ -132,13 +133,14 @@
       `step ${index} of ${last}, facing ${HEADINGS[heading]}${bump}; ${next}`;
     const colour = data.runs[own.run].colour;
     const marks = shown.ghosts.map((ghost) => way(ghost.path, data.runs[ghost.run].colour, 0.03));
+    if (own.memory) marks.unshift(...recalled(index));
     marks.push(way(own.path, colour, 0.03), way(own.path.slice(0, index + 1), colour, 0.09));
     const [ax, ay] = spot([x, y]);
     if (own.heard) {
       const [hx, hy] = spot(own.heard[index]);
-      marks.push(svg("line", { x1: ax, y1: ay, x2: hx, y2: hy, stroke: "#1f6fb2",
+      marks.push(svg("line", { x1: ax, y1: ay, x2: hx, y2: hy, stroke: "#101820",
         "stroke-width": 0.03, "stroke-dasharray": "0.08 0.08" }));
-      marks.push(svg("path", { d: "M-.2 0H.2M0-.2V.2", stroke: "#1f6fb2", "stroke-width": 0.11,
+      marks.push(svg("path", { d: "M-.2 0H.2M0-.2V.2", stroke: "#101820", "stroke-width": 0.11,
         transform: `translate(${hx} ${hy})`, id: "heard" }));
     }
     const [gx, gy] = spot(own.goal);
@@ -156,10 +158,22 @@
     believe(index);
   }
 
+  // The exploration walk that the agent remembers, and the entries that look most like here.
+  function recalled(index) {
+    const entries = own().entries[Math.min(index, own().entries.length - 1)];
+    const dots = entries.map((entry, rank) => {
+      const [cx, cy] = spot(entry);
+      return svg("circle", { cx, cy, r: rank ? 0.08 : 0.15, fill: "#7b3294", class: "entry" });
+    });
+    return [way(own().walk, "#7a7a7a", 0.025), ...dots];
+  }
+  const own = () => shown.own.memory;
+
   function believe(index) {
     const { own, plan, belief } = shown;
     const canvas = at("belief");
     canvas.hidden = !belief || !at("show-belief").checked;
+    at("plan").classList.toggle("believed", !canvas.hidden);
     if (canvas.hidden) return;
     const { width, height, left, top } = own.belief;
     const size = width * height;
