@@ -1,0 +1,78 @@
+"""Traces of real agents with true senses in a drawn apartment, for tests of pictures and films."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from avn.agents.base import Agent
+from avn.agents.planner_agent import PlannerAgent
+from avn.datamodules.sound import relative_locations
+from avn.mapping.memory_mapper import MemoryMapper
+from avn.mapping.occupancy_mapper import OccupancyMapper
+from avn.navigation.episodes import frozen_episodes
+from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.protocols import Protocol
+from avn.navigation.run import Labels, records, walk
+from avn.navigation.simulator import Simulator
+from avn.navigation.trace import Recorder, Trace
+from avn.views.window import window_cells
+
+FLAT = """
+aaaaaaa#bbbbbbbb
+aaaaaaa#bbbbbbbb
+aaaa#####bbbbbbb
+aaaa#aa#bbbbbBbb
+aaaaaaa#bbbbbbbb
+aaaaaaaabbbbbbbb
+aaaaaaa#bbbbbbbb
+"""
+VAR = Protocol("var", "box", False, "attempted", moves_factor=2.0, starts=6, exploration=60)
+TAKES = 3
+
+
+def flat() -> DrawnPlace:
+    return draw("flat", FLAT)
+
+
+def simulator(place: DrawnPlace) -> Simulator:
+    """Six episodes in which the agent hears the very place of the source and sees true windows."""
+    lattice = torch.from_numpy(place.grid.lattice).long()
+    sources = torch.from_numpy(np.asarray(place.sources)).long()
+    where = relative_locations(lattice, sources)[:, :, None, None].expand(-1, -1, 1, TAKES, -1)
+    sights = {
+        "window": torch.from_numpy(window_cells(place.grid) >= 0).float(),
+        "feature": torch.eye(4 * place.grid.cells),  # every state looks like itself alone
+    }
+    return Simulator(place, frozen_episodes(place, ["ring"], VAR, 0), VAR, {"sound": where}, sights)
+
+
+def ours(explores: bool = False, localisation: str = "retrieval+odometry") -> PlannerAgent:
+    mapper = MemoryMapper(41, localisation=localisation) if explores else OccupancyMapper(41)
+    return PlannerAgent(mapper)
+
+
+def walked(agent: Agent, rows: Sequence[int] = tuple(range(6))) -> list[Trace]:
+    """Traces of an agent's episodes in the flat."""
+    world = simulator(flat())
+    recorder = Recorder({"flat": rows}, TAKES, thoughts=True)
+    walk(agent, world, recorder)
+    found = records(world, Labels("ours", "resonance")).to_dict("records")
+    return [recorder.trace("flat", row, found[row]) for row in rows]
+
+
+def clips(trace: Trace) -> Tensor:
+    """A tone for each step that is louder on the right."""
+    time = torch.arange(16000) / 16000
+    steps = torch.arange(len(trace.state))[:, None]
+    tone = torch.sin(2 * torch.pi * (400 + 100 * (steps % 4)) * time)
+    return torch.stack((0.2 * tone, 0.8 * tone), dim=1)
+
+
+def views(trace: Trace) -> np.ndarray:
+    """A picture of one colour for each heading."""
+    colours = np.array([(200, 0, 0), (0, 200, 0), (0, 0, 200), (200, 200, 0)], dtype=np.uint8)
+    return np.tile(colours[trace.state % 4][:, None, None], (1, 16, 16, 1))
