@@ -1,0 +1,84 @@
+import re
+import subprocess
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from drawn_walks import clips, ours, views, walked
+
+from avn.agents.random_walk import RandomWalk
+from avn.errors import UserError
+from avn.navigation.trace import Trace
+from avn.perceived import soundtrack
+from avn.reporting.film import FPS, SIZE, write_film
+
+
+def shown(path: Path) -> np.ndarray:
+    """All pictures of a film, (N, H, W, 3)."""
+    reader = imageio_ffmpeg.read_frames(str(path))
+    size = next(reader)["size"]
+    return np.stack([np.frombuffer(own, np.uint8).reshape(size[1], size[0], 3) for own in reader])
+
+
+def played(path: Path) -> np.ndarray:
+    """A film's sound at 16 kHz as it is stored, (n, channels)."""
+    exe = imageio_ffmpeg.get_ffmpeg_exe()
+    told = subprocess.run([exe, "-i", str(path)], capture_output=True, text=True).stderr
+    channels = {"stereo": 2, "mono": 1}[re.search(r"Audio: aac.* Hz, (\w+)", told)[1]]
+    command = [exe, "-loglevel", "error", "-i", str(path), "-f", "s16le", "-ar", "16000", "-"]
+    raw = subprocess.run(command, capture_output=True, check=True).stdout
+    return np.frombuffer(raw, "<i2").reshape(-1, channels) / 32768
+
+
+def film(path: Path, trace: Trace) -> Path:
+    heard = clips(trace)
+    write_film(path, trace, "ours", views(trace), heard, soundtrack(heard))
+    return path
+
+
+def test_a_film_has_a_second_for_each_step_and_two_ears(tmp_path: Path) -> None:
+    trace = min(walked(ours()), key=lambda own: len(own.action))
+    path = film(tmp_path / "own.mp4", trace)
+    seconds = len(trace.action) + 1
+    pictures, sound = shown(path), played(path)
+    assert pictures.shape == (FPS * seconds, SIZE[1], SIZE[0], 3)
+    assert len(sound) / 16000 == pytest.approx(seconds, abs=0.1)
+    assert sound.shape[1] == 2
+    left, right = np.sqrt((sound**2).mean(axis=0))
+    assert right / left == pytest.approx(4, rel=0.05)  # the right ear stays the right one
+    # the view of each step is what the agent sees there, in the upper left corner
+    for step in range(seconds):
+        seen = pictures[FPS * step + 2, 200:300, 200:300].mean(axis=(0, 1))
+        assert np.abs(seen - views(trace)[step, 0, 0]).max() < 25
+    # the cursor moves within a second, and the agent between seconds
+    assert (pictures[0] != pictures[2]).any()
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_an_agent_without_ears_or_map_is_filmed_too(tmp_path: Path) -> None:
+    trace = min(walked(RandomWalk()), key=lambda own: len(own.action))
+    deaf = type(trace)(**{**vars(trace), "heard": None})
+    pictures = shown(film(tmp_path / "own.mp4", deaf))
+    assert len(pictures) == FPS * len(trace.state)
+
+
+def test_the_seconds_of_a_soundtrack_meet_without_a_click() -> None:
+    trace = walked(ours(), [0])[0]
+    heard = clips(trace)[:4]
+    heard[1:] *= -0.5
+    track = soundtrack(heard)
+    assert track.shape == (4 * 16000, 2)
+    assert np.abs(track).max() == pytest.approx(0.9)
+    hard = heard.permute(0, 2, 1).reshape(-1, 2).numpy()
+    factor = 0.9 / np.abs(hard).max()
+    steps = np.abs(np.diff(track, axis=0)).max()
+    assert steps <= factor * np.abs(np.diff(heard.numpy(), axis=-1)).max() + 0.02
+
+
+def test_a_film_that_cannot_be_written_is_one_line(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/bin/false")
+    trace = walked(ours(), [0])[0]
+    with pytest.raises(UserError, match=r"own.mp4: the film cannot be encoded"):
+        film(tmp_path / "own.mp4", trace)
+    assert not list(tmp_path.iterdir())
