@@ -28,8 +28,10 @@ from avn.rl.a3c import BEST, MONITOR, Training, load_network
 from avn.rl.config import A3CConfig, check_recipe
 from avn.rl.explorations import draw_walks
 from avn.rl.networks import ActorCritic, Shape
+from avn.rl.starts import build_starts
 from avn.rl.tables import Tables, build_tables
 from avn.rl.worker import Task
+from avn.rl.world import World
 from avn.sound_features import Clips
 from avn.stages import check_name, digest, file_hash, make_once, stage_folder, written_whole
 
@@ -106,6 +108,36 @@ def parts(cfg: DictConfig, ready: bool) -> dict[str, Any]:
         "map_size": cfg.mapper.size,
     }
     return given | ({"network": policy(cfg)[0]} if ready else {})
+
+
+def observed_names(cfg: DictConfig) -> tuple[str, ...]:
+    """What the config's agent observes, by the names of `avn.rl.environment.WalkEnv`."""
+    heard = ("sound_feature",) if listening.hears(cfg) else ()
+    return ("feature", *heard, *(("map",) if seeing.sees_windows(cfg) else ()))
+
+
+def open_tables(cfg: DictConfig, part: str) -> tuple[Tables, Protocol, A3CConfig]:
+    """The apartments of a part as tables, with the rules and the recipe.
+
+    Raises
+    ------
+    UserError
+        Where `part` is none of `PARTS`.
+    """
+    if part not in PARTS:
+        raise UserError(f"part: '{part}' is none of {', '.join(PARTS)}")
+    protocol: Protocol = instantiate(cfg.protocol)
+    rooms, hearing, sights = _observed(cfg, part)
+    tables = build_tables(rooms, protocol, hearing, sights, len(listening.TRAINING_SOUNDS))
+    return tables, protocol, check_recipe(pipeline.typed(cfg.a3c))
+
+
+def free_world(
+    tables: Tables, protocol: Protocol, recipe: A3CConfig, n: int, max_steps: int | None
+) -> World:
+    """N episodes in the apartments of tables, without exploration."""
+    starts = build_starts(tables)
+    return World(tables, starts, n, protocol, max_steps, recipe.reward, recipe.train_seed)
 
 
 def _clips(cfg: DictConfig, part: str) -> Clips:

@@ -1,1 +1,18 @@
-"""Reinforcement learning: the environment, the actor-critic networks and A3C."""
+"""Reinforcement learning: the environment, the actor-critic networks and A3C.
+
+Where Gymnasium is installed, `import avn.rl` lets it know the world as "avn/Walk-v0":
+`gymnasium.make("avn/Walk-v0", overrides=["split=mini"])`, or `make_vec` with
+`vectorization_mode="vector_entry_point"` for N agents in one batch.
+"""
+
+from importlib.util import find_spec
+
+if find_spec("gymnasium"):
+    import gymnasium
+
+    if "avn/Walk-v0" not in gymnasium.registry:
+        gymnasium.register(
+            id="avn/Walk-v0",
+            entry_point="avn.rl.walk_gym:make_walk",
+            vector_entry_point="avn.rl.walk_gym:make_walks",
+        )

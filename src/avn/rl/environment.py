@@ -42,6 +42,11 @@ class FeatureModule(nn.Module):
             table = tables.sights.get(name, tables.hearing.get(name))
             self.register_buffer(name, table, persistent=False)
 
+    def range(self, name: str) -> tuple[float, float]:
+        """The least and the greatest number of an observation."""
+        low, high = torch.aminmax(torch.nan_to_num(getattr(self, name).float()))
+        return float(low), float(high)
+
     def forward(self, state: Tensor, clip: Tensor) -> dict[str, Tensor]:
         """What is observed in states (...,) and in clips (...,), by name, (..., D) each."""
         found = {name: getattr(self, name)[state] for name in self.seen}
@@ -253,8 +258,8 @@ class WalkEnv(EnvBase):
             return Categorical(2, shape=value.shape, dtype=torch.bool)
         if name == "map":
             return Bounded(0.0, 1.0, shape=value.shape)
-        if name == "view":
-            return Bounded(0, 255, shape=value.shape, dtype=torch.uint8)
+        if name in (*self.features.seen, *self.features.heard):
+            return Bounded(*self.features.range(name), shape=value.shape, dtype=value.dtype)
         return Unbounded(shape=value.shape, dtype=value.dtype)
 
 

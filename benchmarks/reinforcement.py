@@ -1,0 +1,264 @@
+"""Environment and training steps a second, against Stable-Baselines3's A2C on the same world.
+
+The world is a hand-drawn flat with features of the real sizes. Ours trains with two workers, the
+peer with its best of one and two threads; both have the same network, N, steps a batch, rewards
+and optimiser. Then the return of both after the same steps, over three seeds.
+
+    python benchmarks/reinforcement.py [steps of a training, default 200000]
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3 import A2C
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnv
+
+from avn.datamodules.sound import relative_locations
+from avn.navigation.place import draw
+from avn.navigation.protocols import Protocol
+from avn.rl.a3c import Training
+from avn.rl.config import A3CConfig
+from avn.rl.environment import WalkEnv
+from avn.rl.explorations import draw_walks
+from avn.rl.networks import ActorCritic, Shape
+from avn.rl.starts import build_starts
+from avn.rl.tables import Tables, build_tables
+from avn.rl.worker import Task
+from avn.rl.world import World
+from avn.views.window import window_cells
+
+VAR = Protocol("var", "box", False, "attempted", moves_factor=2.0)
+FLAT = """
+aaaaaaaa#bbbbbbbb
+aaAa##aa#bbbb##bb
+aaaa##aa#bbbbbbbb
+aaaaaaaaabbb#bbBb
+aa##aaaa#bbb#bbbb
+aa##aaaa#bbbbbbbb
+####a#######b####
+ccccccccc#ddddddd
+ccCcccccc#dd##ddd
+ccc###ccc#ddddDdd
+cccccccccccdddddd
+cc##ccccC#ddddddd
+"""
+WIDTH, N, STEPS = 128, 64, 20
+RECIPE = {"episodes": N, "steps": STEPS, "lr": 7e-4, "eps": 1e-5, "schedule": "constant"}
+ROWS = {
+    "a3c_v": ("feature",),
+    "a3c_va": ("feature", "sound_feature"),
+    "a3c_va_mapper": ("feature", "sound_feature", "map"),
+    "a3c_va_m": ("feature", "sound_feature", "memory"),
+    "a3c_va_m_mapper": ("feature", "sound_feature", "map", "memory"),
+}
+
+
+def world_tables() -> tuple[list, Tables]:
+    """Two copies of the flat, with random pictures and sound that tells where it comes from."""
+    places = [draw("one", FLAT), draw("two", FLAT)]
+    generator = torch.Generator().manual_seed(0)
+    hearing, sights = [], []
+    project = torch.randn(2, 258, generator=generator)
+    for place in places:
+        lattice = torch.from_numpy(place.grid.lattice).long()
+        where = relative_locations(lattice, torch.from_numpy(np.asarray(place.sources)).long())
+        clips = where[:, :, None, None].expand(-1, -1, 3, 4, -1) @ project
+        heard = clips + torch.randn(clips.shape, generator=generator)
+        hearing.append({"sound_feature": heard.half()})
+        pictures = torch.randn(4 * len(lattice), 1280, generator=generator)
+        windows = torch.from_numpy(window_cells(place.grid) >= 0).float()
+        sights.append({"feature": torch.nn.functional.normalize(pictures), "window": windows})
+    return places, build_tables(places, VAR, hearing, sights)
+
+
+def task_of(row: str, places: list, tables: Tables, **recipe) -> Task:
+    """What there is to learn in a row of the table."""
+    names = ROWS[row]
+    both = {**tables.sights, **tables.hearing}
+    features = {name: both[name].shape[-1] for name in names if name in both}
+    memory, maps = 128 * ("memory" in names), "map" in names
+    shape = Shape(features, VAR.actions, WIDTH, memory, maps * (2 if memory else 1))
+    network = ActorCritic(shape)
+    for name in features:
+        network.standardise(name, both[name][::7])
+    walks = draw_walks(places, tables, 32, 400, 0) if memory else None
+    given = A3CConfig(**(RECIPE | recipe))
+    return Task(tables, VAR, shape, given, dict(network.named_buffers()), walks=walks)
+
+
+class Ours:
+    """A training of ours: steps a second, and the return of its last rounds."""
+
+    def __init__(self, task: Task, steps: int) -> None:
+        torch.manual_seed(task.recipe.train_seed)
+        network = ActorCritic(task.shape)
+        network.load_state_dict(task.buffers, strict=False)
+        with tempfile.TemporaryDirectory() as folder:
+            measure = {"validation/spl": 0.0}
+            curve = Training(task, network, Path(folder), lambda _: measure, "b" * 64).run()
+        rounds = curve[1:]
+        self.rate = float(np.mean([own["steps_per_second"] for own in rounds[-2:]]))
+        self.earned = rounds[-1]["return"]
+        self.steps = steps
+
+
+class PeerEnv(VecEnv):
+    """The same world for Stable-Baselines3: features gathered for all episodes at once."""
+
+    def __init__(self, tables: Tables, names: tuple[str, ...], seed: int, max_steps: int) -> None:
+        world = World(tables, build_starts(tables), N, VAR, max_steps, seed=seed)
+        self.env = WalkEnv(world, names)
+        boxes = {
+            name: gymnasium.spaces.Box(*self.env.features.range(name), value.shape[1:])
+            for name, value in self._seen().items()
+        }
+        space = gymnasium.spaces.Dict(boxes)
+        super().__init__(N, space, gymnasium.spaces.Discrete(VAR.actions))
+
+    def _seen(self) -> dict[str, np.ndarray]:
+        seen = self.env.look()
+        found = self.env.features(seen["state"], seen["clip"])
+        return {name: value.float().numpy() for name, value in found.items()}
+
+    def reset(self):
+        self.env.begin(torch.ones(N, dtype=torch.bool))
+        return self._seen()
+
+    def step_async(self, actions):
+        self._actions = torch.from_numpy(actions)
+
+    def step_wait(self):
+        reward, terminated, truncated = self.env.move(self._actions)
+        done, infos = (terminated | truncated).numpy(), [{} for _ in range(N)]
+        if done.any():
+            last = self._seen()
+            for row in np.flatnonzero(done):
+                infos[row]["TimeLimit.truncated"] = bool(truncated[row])
+                infos[row]["terminal_observation"] = {k: v[row] for k, v in last.items()}
+            self.env.begin(torch.from_numpy(done))
+        return self._seen(), reward.numpy(), done, infos
+
+    def close(self): ...
+    def get_attr(self, name, indices=None):
+        return [None] * N
+
+    def set_attr(self, name, value, indices=None): ...
+    def env_method(self, name, *args, indices=None, **kwargs):
+        return [None] * N
+
+    def env_is_wrapped(self, wrapper, indices=None):
+        return [False] * N
+
+
+class Returns(BaseCallback):
+    """Mean return of the episodes that ended lately, and the rate of the second half."""
+
+    def __init__(self, steps: int) -> None:
+        super().__init__()
+        self.running, self.ended, self.marks = np.zeros(N), [], []
+        self.steps = steps
+
+    def _on_step(self) -> bool:
+        self.running += self.locals["rewards"]
+        done = self.locals["dones"]
+        self.ended += [(self.num_timesteps, own) for own in self.running[done]]
+        self.running[done] = 0.0
+        self.marks.append((self.num_timesteps, time.perf_counter()))
+        return True
+
+    def rate(self) -> float:
+        (a, t), (b, u) = self.marks[len(self.marks) // 2], self.marks[-1]
+        return (b - a) / (u - t)
+
+    def earned(self, last: int) -> float:
+        end = self.marks[-1][0]
+        return float(np.mean([own for at, own in self.ended if at > end - last]))
+
+
+def peer(tables: Tables, row: str, steps: int, seed: int, threads: int) -> tuple[float, float]:
+    """Steps a second and last return of Stable-Baselines3's A2C."""
+    torch.set_num_threads(threads)
+    env = PeerEnv(tables, ROWS[row], seed, 200)
+    sizes = {
+        "net_arch": [WIDTH, WIDTH],
+        "activation_fn": torch.nn.ReLU,
+        "share_features_extractor": True,
+    }
+    model = A2C(
+        "MultiInputPolicy",
+        env,
+        n_steps=STEPS,
+        learning_rate=7e-4,
+        rms_prop_eps=1e-5,
+        ent_coef=0.01,
+        max_grad_norm=40.0,
+        policy_kwargs=sizes,
+        seed=seed,
+        device="cpu",
+    )
+    watch = Returns(steps)
+    model.learn(steps, callback=watch)
+    torch.set_num_threads(1)
+    return watch.rate(), watch.earned(steps // 10)
+
+
+def environment(tables: Tables) -> None:
+    """Steps a second of the environment alone, with features gathered."""
+    for n in (64, 256, 1024):
+        env = WalkEnv(World(tables, build_starts(tables), n, VAR, 200), ROWS["a3c_va"])
+        actions = torch.randint(4, (200, n))
+        began = time.perf_counter()
+        for own in actions:
+            _, terminated, truncated = env.move(own)
+            seen = env.look()
+            env.features(seen["state"], seen["clip"])
+            done = terminated | truncated
+            if bool(done.any()):
+                env.begin(done)
+        rate = 200 * n / (time.perf_counter() - began)
+        print(f"environment, features gathered, one thread, N={n}: {rate:,.0f} steps/s")
+
+
+def main() -> None:
+    steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
+    torch.set_num_threads(1)
+    places, tables = world_tables()
+    environment(tables)
+    each = max(1, steps // 10)
+    for row in ROWS:
+        task = task_of(row, places, tables, total=steps, validate_every=each)
+        print(f"{row}, two workers, N={N} each: {Ours(task, steps).rate:,.0f} steps/s")
+    ours, peers = [], []
+    for seed in range(3):
+        options = {"total": steps, "validate_every": each, "train_seed": seed}
+        ours.append(Ours(task_of("a3c_va", places, tables, **options), steps))
+        peers += [(threads, *peer(tables, "a3c_va", steps, seed, threads)) for threads in (1, 2)]
+    fastest = max(rate for _, rate, _ in peers)
+    rate = max(own.rate for own in ours)
+    print(
+        f"Stable-Baselines3 A2C, the same network, N={N}, best of 1 and 2 threads: {fastest:,.0f}"
+    )
+    print(f"ours against it: {rate / fastest:.2f} times as fast")
+    earned = [own.earned for own in ours], [value for _, _, value in peers]
+    for name, values in zip(("ours", "Stable-Baselines3"), earned, strict=True):
+        print(
+            f"return after {steps:,} steps, {name}: {np.mean(values):.2f} +- {np.std(values):.2f}"
+        )
+    peak = max(
+        resource.getrusage(who).ru_maxrss
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    print(f"peak memory of a process: {peak / 1024:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()
