@@ -98,6 +98,8 @@ def _with_schema(group: str, node: DictConfig, default: DictConfig) -> DictConfi
     nodes = [OmegaConf.structured(schema) for schema in found]
     fitting = [own for own in nodes if set(map(str, node)) <= set(map(str, own))]
     if not fitting:
+        if OmegaConf.get_type(default) is dict:  # of names and paths, which are the file's alone
+            return node
         return OmegaConf.merge(default, node)  # type: ignore[return-value]
     best = min(fitting, key=lambda own: (len(own), own._metadata.object_type.__name__))
     return OmegaConf.merge(best, node)  # type: ignore[return-value]

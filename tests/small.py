@@ -1,0 +1,26 @@
+"""Settings with which a command on the mini split takes seconds."""
+
+SMALL = (
+    "split=mini",
+    "processes=1",
+    "acoustics.rays=300",
+    "acoustics.seconds=0.2",
+    "sound_model.epochs=1",
+    "takes=2",
+    "protocol.starts=4",
+    "sound=[alarm,clock]",
+    # as in test_commands.py, for views of other settings in one folder are refused
+    "renderer.camera.size=32",
+    "renderer.samples=1",
+    "renderer.light.gather_rays=4",
+    "renderer.light.shadow_rays=2",
+    "renderer.light.spacing=0.3",
+    "backbone.size=32",
+)
+# The occupancy network of a row that sees.
+EYES = (
+    "mapper.network.epochs=1",
+    "mapper.network.looks=1",
+    "mapper.network.times=1",
+    "mapper.network.validation_views=40",
+)

@@ -1,0 +1,48 @@
+"""`film=` of `avn.eval` on the mini split."""
+
+from pathlib import Path
+
+import imageio_ffmpeg
+import pandas as pd
+import pytest
+from small import SMALL
+
+
+def run(command, outputs, *more):
+    return command("eval", "agent=greedy", *SMALL, f"outputs={outputs}", *more)
+
+
+def test_films_of_what_is_asked_for_lie_in_the_run_and_change_nothing(command, outputs):
+    code, out, err = run(command, outputs)
+    assert code == 0, err
+    folder = Path(out[-1])
+    before = {path: path.read_bytes() for path in folder.glob("*.csv")}
+    episodes = pd.read_csv(folder / "episodes.csv")
+    word = "success" if episodes["success"].any() else "failure"
+    code, out, err = run(command, outputs, "film=1", f"film_show={word}")
+    assert code == 0, err
+    assert Path(out[-1]) == folder
+    (film,) = (folder / "films").glob("*.mp4")
+    room, sound, number, outcome = film.stem.split("-")
+    row = episodes.query(f"room == '{room}' and sound == '{sound}' and episode == {number}")
+    assert row["outcome"].item() == outcome
+    _, seconds = imageio_ffmpeg.count_frames_and_secs(str(film))
+    assert seconds == pytest.approx(row["actions"].item() + 1, abs=0.2)
+    assert {path: path.read_bytes() for path in folder.glob("*.csv")} == before
+    # a second time they are there already
+    stamp = film.stat().st_mtime_ns
+    code, out, _ = run(command, outputs, "film=1", f"film_show={word}")
+    assert code == 0
+    assert film.stat().st_mtime_ns == stamp
+    assert str(film) in out
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [("film=-1", "film: -1 is out of range"), ("film_show=best", "film_show: 'best' is none of")],
+)
+def test_a_mistake_is_one_line(command, outputs, option, said):
+    code, _, err = run(command, outputs, "film=1", option)
+    assert code == 2
+    assert len(err) == 1
+    assert said in err[0]

@@ -1,0 +1,109 @@
+"""Finished runs of the mini split, walked again."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import torch
+from small import EYES, SMALL
+
+from avn import evaluation, listening, replay
+from avn.errors import UserError
+from avn.perceived import Perceived
+from avn.reporting.results import write_csv
+
+
+def made(command, outputs, agent, *more):
+    eyes = EYES if agent == "ours_noexp" else ()
+    code, out, err = command("eval", f"agent={agent}", *SMALL, *eyes, f"outputs={outputs}", *more)
+    assert code == 0, err
+    return Path(out[-1])
+
+
+@pytest.mark.parametrize("agent", ["random_walk", "greedy", "ours_noexp", "ours_exp"])
+def test_a_run_is_walked_again_from_its_own_config(command, outputs, agent):
+    folder = made(command, outputs, agent)
+    run = replay.open_run(folder)
+    # nothing of the config was lost: what it makes has the same name
+    assert evaluation.run_folder_name(run.cfg) == folder.relative_to(outputs / "eval").as_posix()
+    labels = [0, 3, len(run.episodes) - 1]
+    traces = replay.traces(run, labels)
+    for label, trace in zip(labels, traces, strict=True):
+        row = run.episodes.loc[label]
+        assert trace.record["row"] == label
+        assert trace.state[-1] // 4 == row["end_cell"]
+        assert len(trace.action) == row["actions"]
+    assert (traces[0].heard is None) == (agent == "random_walk")
+    assert (traces[0].thoughts is None) == (agent in ("random_walk", "greedy"))
+    assert (traces[0].walk is None) == (agent != "ours_exp")
+
+
+def test_the_clips_of_a_trace_are_those_that_the_network_heard(command, outputs):
+    run = replay.open_run(made(command, outputs, "greedy"))
+    model, _ = listening.sound_model(run.cfg)
+    perceived = Perceived(run)
+    for trace in replay.traces(run, [1, len(run.episodes) - 2]):
+        with torch.inference_mode():
+            heard = model.eval()(perceived.clips(trace))
+        heading, here = trace.state % 4, trace.path
+        right, front = heard.double().unbind(1)
+        east = torch.stack((right, front, -right, -front))[heading, torch.arange(len(here))]
+        north = torch.stack((front, -right, -front, right))[heading, torch.arange(len(here))]
+        found = here + torch.stack((east, north), dim=1).numpy()
+        assert abs(found - trace.heard).max() < 1e-3
+
+
+def test_records_of_another_making_are_refused(command, outputs):
+    folder = made(command, outputs, "greedy", "seed=3")
+    path = folder / "episodes.csv"
+    whole = path.read_bytes()
+    run = replay.open_run(folder)
+    try:
+        episodes = run.episodes.copy()
+        episodes.loc[0, "end_cell"] += 1
+        write_csv(episodes, path)
+        with pytest.raises(UserError, match=r"walked again, its episodes end otherwise"):
+            replay.traces(replay.open_run(folder), [0])
+    finally:
+        path.write_bytes(whole)
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(UserError, match=r"no run's folder, it has no config.yaml"):
+        replay.open_run(tmp_path)
+
+
+def episodes() -> pd.DataFrame:
+    rows = [
+        ("a", "ring", 1, 1.0, 0.0, 4.0),
+        ("a", "ring", 1, 0.5, 0.5, 6.0),
+        ("a", "clock", 0, 0.0, 3.0, 6.0),
+        ("b", "ring", 1, 0.6, 0.5, 6.0),
+        ("b", "ring", 0, 0.0, 9.0, 9.0),
+        ("b", "clock", 1, 0.5, 0.5, 9.0),
+    ]
+    columns = ["room", "sound", "success", "spl", "dtg", "geodesic"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_what_is_chosen_is_typical_and_from_everywhere():
+    chosen = replay.choose(episodes(), "typical", 2)
+    assert chosen[0] == 1  # of the median SPL, and as far away as most
+    assert set(episodes().loc[chosen, "room"]) == {"a", "b"}
+    assert set(replay.choose(episodes(), "success", 9)) == {0, 1, 3, 5}
+    assert set(replay.choose(episodes(), "failure", 9)) == {2, 4}
+    assert replay.choose(episodes()[episodes()["success"] == 1], "failure", 2) == []
+    assert replay.choose(episodes(), "typical", 0) == []
+    with pytest.raises(UserError, match="film_show: 'best' is none of typical, success, failure"):
+        replay.choose(episodes(), "best", 1)
+
+
+def test_names_tell_runs_apart_by_what_differs(command, outputs):
+    one = replay.open_run(made(command, outputs, "random_walk"))
+    other = replay.open_run(made(command, outputs, "random_walk", "seed=1"))
+    third = replay.open_run(made(command, outputs, "greedy"))
+    assert replay.names_of([one, third]) == ["random_walk", "greedy"]
+    assert replay.names_of([one, other]) == ["random_walk, seed=0", "random_walk, seed=1"]
+    with pytest.raises(UserError, match="walked other episodes"):
+        replay.same_episodes(one, [0], other)
+    assert replay.same_episodes(one, [2, 0], third) == [2, 0]
