@@ -1,0 +1,193 @@
+"""`python -m avn.report` on runs of the mini split, looked at in Chromium."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from browser import PHONE, chromium, opened, overflows, until
+from small import EYES, SMALL
+
+from avn import report
+from avn.reporting import page_media
+from avn.reporting.page import PageRun, render
+from avn.reporting.results import summarise
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as found:
+        yield found
+
+
+def made(command, outputs, agent, *more):
+    eyes = EYES if agent == "ours_noexp" else ()
+    code, out, err = command("eval", f"agent={agent}", *SMALL, *eyes, f"outputs={outputs}", *more)
+    assert code == 0, err
+    return Path(out[-1])
+
+
+@pytest.fixture
+def page(command, outputs, capfd):
+    """The page of three runs, made once."""
+    path = outputs / "report" / "three.html"
+    if not path.is_file():
+        folders = [str(made(command, outputs, agent)) for agent in AGENTS]
+        assert report.main([*folders, "--output", str(path)]) == 0
+    return path
+
+
+AGENTS = ("ours_noexp", "ours_exp", "greedy")
+
+
+def column(opened_page, index):
+    return opened_page.eval_on_selector_all(
+        f"#results tbody tr > :nth-child({index})", "cells => cells.map(c => c.dataset.sort)"
+    )
+
+
+def test_the_table_sorts_by_either_figure(browser, page):
+    with opened(browser, page) as shown:
+        assert shown.locator("#results tbody tr").count() == len(AGENTS) * 3
+        last = shown.locator("#results thead th").count()
+        for figure in ("spl", "sr"):
+            shown.locator(f"input[name=by][value={figure}]").check()
+            shown.locator("#results thead th").last.click()
+            shown.wait_for_timeout(100)
+            values = [float(value) for value in column(shown, last)]
+            assert values in (sorted(values), sorted(values, reverse=True))
+            assert len(set(values)) > 1
+        # with the keyboard too, and the other way round
+        shown.locator("#results thead th").last.press("Enter")
+        shown.wait_for_timeout(100)
+        assert [float(value) for value in column(shown, last)] == values[::-1]
+
+
+def test_figures_are_those_of_the_run_with_intervals_and_the_papers(
+    browser, page, command, outputs
+):
+    run = made(command, outputs, "greedy")
+    table = pd.read_csv(run / "results.csv").query("sound == 'alarm' and room == 'room_1'")
+    row = (100 * table[["sr", "spl", "sr_low", "sr_high"]]).iloc[0]
+    with opened(browser, page) as shown:
+        cell = shown.locator("td.cell[data-run='2'][data-sound=alarm][data-room=room_1]")
+        assert cell.locator("b").inner_text() == f"{row['sr']:.1f} / {row['spl']:.1f}"
+        assert f"{row['sr_low']:.0f}–{row['sr_high']:.0f}" in cell.inner_text()
+        assert "paper 9.0 / 8.2" in cell.inner_text()
+
+
+def test_a_cell_opens_its_episodes_and_an_episode_plays(browser, page, command, outputs):
+    episodes = pd.read_csv(made(command, outputs, "ours_noexp") / "episodes.csv")
+    with opened(browser, page) as shown:
+        shown.locator("td.cell[data-run='0'][data-sound=clock][data-room=room_1]").click()
+        rows = shown.locator("#episode-list tbody tr")
+        assert rows.count() == len(episodes.query("sound == 'clock'"))
+        shown.locator("#episode-list tr.open").first.click()
+        number = shown.locator("#episode-list tr.open td").nth(3).inner_text()
+        row = episodes.query(f"sound == 'clock' and episode == {number}").iloc[0]
+        sound = "document.getElementById('sound')"
+        until(shown, f"{sound}.readyState === 4")
+        assert shown.evaluate(f"{sound}.duration") == pytest.approx(row["actions"] + 1, abs=0.2)
+        assert shown.evaluate("document.getElementById('view').naturalWidth") == 32
+        # a step on: view, sound and the agent on the plan go with it
+        places = []
+        for step in range(3):
+            places.append(shown.locator("#agent").get_attribute("transform"))
+            assert f"step {step} of {row['actions']}" in shown.locator("#caption").inner_text()
+            shown.locator("#on").click()
+        assert len(set(places)) > 1
+        assert shown.evaluate(f"{sound}.currentTime") == pytest.approx(3, abs=0.1)
+        # the belief lies on the plan and can be taken off
+        assert shown.locator("#belief").is_visible()
+        shown.locator("#show-belief").uncheck()
+        assert not shown.locator("#belief").is_visible()
+        # while it plays, the steps follow
+        shown.evaluate(f"{sound}.muted = true")
+        shown.evaluate(f"{sound}.play()")
+        until(shown, f"{sound}.currentTime > 3.4")
+        assert int(shown.locator("#step").input_value()) >= 3
+
+
+def test_the_same_episode_of_other_runs_stands_beside(browser, page):
+    with opened(browser, page) as shown:
+        shown.locator("td.cell[data-run='0'][data-sound=alarm][data-room=room_1]").click()
+        shown.locator("#episode-list tr.open").first.click()
+        titles = set()
+        assert shown.locator("#twins button").count() == len(AGENTS)
+        for index, agent in enumerate(AGENTS):
+            button = shown.locator("#twins button").nth(index)
+            button.click()
+            assert button.inner_text().startswith(f"{agent}: ")
+            assert button.get_attribute("aria-pressed") == "true"
+            titles.add(shown.locator("#episode-title").inner_text())
+            assert shown.locator("circle.entry").count() == (3 if agent == "ours_exp" else 0)
+            assert shown.locator("#belief").is_visible() == (agent != "greedy")
+        assert len(titles) == 1
+        assert shown.locator("#differences tbody tr").count() == 2
+
+
+def test_it_is_readable_on_a_phone(browser, page):
+    with opened(browser, page, PHONE) as shown:
+        assert not overflows(shown)
+        shown.locator("td.cell").first.click()
+        shown.locator("#episode-list tr.open").first.click()
+        until(shown, "document.getElementById('sound').readyState === 4")
+        assert not overflows(shown)
+        box = shown.locator("#view").bounding_box()
+        assert box["width"] > 300
+
+
+def test_what_comes_from_names_is_shown_and_never_run(browser, tmp_path):
+    evil = (
+        "</script><script>window.bad=1</script><img src=x onerror=window.bad=1>\u2028'\"&amp;{{1}}"
+    )
+    row = {"agent": evil, "protocol": evil, "acoustics": evil, "look": evil, "sound": evil}
+    row |= {"room": evil, "seed": 0, "episode": 0, "source": 0, "outcome": evil, "geodesic": 2.0}
+    row |= {"in_sight": 1, "rooms_crossed": 0, "actions": 3, "start_cell": 0, "start_heading": 0}
+    row |= {"success": 1, "spl": 1.0, "softspl": 1.0, "sna": 1.0, "dtg": 0.0}
+    episodes = pd.DataFrame([row])
+    run = PageRun(evil, evil, evil, True, summarise(episodes), episodes, {0: 0})
+    pixel = page_media.view_url(np.zeros((4, 4, 3), dtype=np.uint8))
+    plan = {"image": pixel, "left": 0.0, "top": 4.0, "width": 4.0, "height": 4.0}
+    episode = {"title": evil, "outcome": evil, "goal": [1, 1], "path": [[1, 1, 0], [1, 2, 0]]}
+    episode |= {"action": [0], "collided": [0, 0], "heard": None, "belief": None, "memory": None}
+    episode |= {"sound": page_media.sound_url(np.zeros((32000, 2), dtype=np.float32))}
+    episode |= {"run": 0, "plan": 0, "views": [0, 0], "twins": [0]}
+    html = render(evil, [run], [plan], [pixel], [episode], pixel)
+    path = tmp_path / "evil.html"
+    path.write_text(html, encoding="utf-8")
+    with opened(browser, path) as shown:
+        shown.locator("td.cell").first.click()
+        shown.locator("#episode-list tr.open").first.click()
+        shown.wait_for_timeout(200)
+        assert shown.evaluate("window.bad") is None
+        assert shown.locator("h1").text_content() == evil
+        assert shown.locator("#episode-title").text_content() == evil
+        assert evil in shown.locator("#twins").text_content()
+        assert shown.locator("img[src=x]").count() == 0
+        assert not overflows(shown)
+
+
+def test_a_page_lies_in_outputs_and_may_hold_tables_alone(command, outputs, capfd):
+    folder = made(command, outputs, "random_walk")
+    assert report.main([str(folder), "--episodes", "0"]) == 0
+    path = Path(capfd.readouterr().out.splitlines()[-1])
+    assert path.parent == outputs.resolve() / "report"
+    assert path.name.startswith("report-")
+    html = path.read_text(encoding="utf-8")
+    assert "data:audio" not in html
+    assert "http" not in html.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")
+
+
+def test_mistakes_are_one_line(command, outputs, capfd, tmp_path):
+    folder = str(made(command, outputs, "random_walk"))
+    for arguments, said in (
+        ([str(tmp_path)], "no run's folder"),
+        ([folder, folder], "a folder is given twice"),
+        ([folder, "--episodes", "-1"], "--episodes: -1 is less than 0"),
+        ([folder, "--show", "best"], "'best' is none of"),
+        ([folder, "--episodes", "0", "--output", "/proc/no/page.html"], "/proc/no"),
+    ):
+        assert report.main(arguments) == 2
+        (line,) = capfd.readouterr().err.strip().splitlines()
+        assert said in line
