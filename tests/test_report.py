@@ -153,7 +153,7 @@ def test_what_comes_from_names_is_shown_and_never_run(browser, tmp_path):
     episode |= {"action": [0], "collided": [0, 0], "heard": None, "belief": None, "memory": None}
     episode |= {"sound": page_media.sound_url(np.zeros((32000, 2), dtype=np.float32))}
     episode |= {"run": 0, "plan": 0, "views": [0, 0], "twins": [0]}
-    html = render(evil, [run], [plan], [pixel], [episode], pixel)
+    html = render(evil, [run], [plan], [pixel], [episode])
     path = tmp_path / "evil.html"
     path.write_text(html, encoding="utf-8")
     with opened(browser, path) as shown:
@@ -191,3 +191,26 @@ def test_mistakes_are_one_line(command, outputs, capfd, tmp_path):
         assert report.main(arguments) == 2
         (line,) = capfd.readouterr().err.strip().splitlines()
         assert said in line
+
+
+def test_runs_of_several_seeds_stand_together_too(browser, command, outputs, capfd, tmp_path):
+    runs = [made(command, outputs, "greedy", f"seed={seed}") for seed in (0, 1)]
+    runs += [made(command, outputs, "random_walk", f"seed={seed}") for seed in (0, 1)]
+    path = tmp_path / "seeds.html"
+    assert report.main([*map(str, runs), "--output", str(path)]) == 0
+    episodes = pd.concat([pd.read_csv(run / "episodes.csv") for run in runs[:2]])
+    with opened(browser, path) as shown:
+        names = shown.locator("#results tbody th").all_inner_texts()
+        assert set(names) == {
+            *("greedy, seeds 0, 1", "greedy, seed=0", "greedy, seed=1"),
+            *("random_walk, seeds 0, 1", "random_walk, seed=0", "random_walk, seed=1"),
+        }
+        cell = shown.locator("td.cell[data-run='0'][data-sound=all][data-room=average]")
+        assert cell.locator("b").inner_text().startswith(f"{100 * episodes['success'].mean():.1f}")
+        assert "over seeds" in cell.inner_text()
+        cell.click()
+        assert shown.locator("#episode-list tbody tr").count() == len(episodes)
+        assert shown.locator("#episode-list tr.open").count() == 4  # two sounds, two seeds
+        assert shown.locator("#differences tbody th").all_inner_texts() == [
+            "random_walk, seeds 0, 1"
+        ]

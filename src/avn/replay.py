@@ -179,6 +179,13 @@ def names_of(runs: Sequence[Run]) -> list[str]:
     return names
 
 
+def settings_but_seed(run: Run) -> str:
+    """All settings of a run that make its records, but for the seed of its episodes."""
+    machine = ("seed", "outputs", "processes", "auto", "film", "film_show")
+    own = _flat(run.cfg)
+    return repr(sorted((key, value) for key, value in own.items() if key not in machine))
+
+
 def _flat(node: Any, path: str = "") -> dict[str, str]:
     """A config as dotted keys and texts."""
     if isinstance(node, DictConfig):

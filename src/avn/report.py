@@ -11,13 +11,16 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+
 from avn import replay
 from avn.cli import plainly
 from avn.errors import UserError
 from avn.perceived import Perceived, soundtrack
 from avn.replay import Run
 from avn.reporting import page, page_media
-from avn.reporting.breakdown import breakdown_figure
+from avn.reporting.results import across_seeds, summarise
 from avn.stages import digest, stage_folder, tell, written_whole
 
 
@@ -73,12 +76,15 @@ def build(runs: Sequence[Run], count: int, show: str) -> str:
         Which; as `avn.replay.choose`, of the first run, and the same ones of the others.
     """
     names = replay.names_of(runs)
+    groups = _seed_groups(runs)
+    within = {index for group in groups for index in group}
     media = _Media()
     pages = []
     for index, (run, labels) in enumerate(zip(runs, _chosen(runs, count, show), strict=True)):
         if labels:
             tell(f"{run.folder}: walking {len(labels)} episodes again")
-        embedded = media.add(run, index, labels) if labels else {}
+        # the runs of several seeds taken together stand first
+        embedded = media.add(run, len(groups) + index, labels) if labels else {}
         pages.append(
             page.PageRun(
                 name=names[index],
@@ -88,13 +94,48 @@ def build(runs: Sequence[Run], count: int, show: str) -> str:
                 results=run.results,
                 episodes=run.episodes,
                 media=embedded,
+                within=index in within,
             )
         )
-    by_name = dict(zip(names, (run.episodes for run in runs), strict=True))
-    figure = page_media.figure_url(breakdown_figure(by_name))
-    title = " · ".join(dict.fromkeys(str(run.cfg.agent.name) for run in runs))
+    together = [_together([runs[i] for i in own], [pages[i] for i in own]) for own in groups]
+    agents = " · ".join(dict.fromkeys(str(run.cfg.agent.name) for run in runs))
     return page.render(
-        f"Runs of {title}", pages, media.plans, media.views, media.with_twins(), figure
+        f"Runs of {agents}",
+        [*together, *pages],
+        media.plans,
+        media.views,
+        media.with_twins(),
+    )
+
+
+def _seed_groups(runs: Sequence[Run]) -> list[list[int]]:
+    """Numbers of the runs that differ in their seed alone, where there are two or more."""
+    groups: dict[str, list[int]] = {}
+    for index, run in enumerate(runs):
+        groups.setdefault(replay.settings_but_seed(run), []).append(index)
+    return [own for own in groups.values() if len(own) > 1]
+
+
+def _together(runs: Sequence[Run], pages: Sequence[page.PageRun]) -> page.PageRun:
+    """Runs that differ in their seed alone as one."""
+    seeds = ", ".join(str(run.cfg.seed) for run in runs)
+    episodes = pd.concat([own.episodes for own in pages], ignore_index=True)
+    starts = np.cumsum([0, *(len(own.episodes) for own in pages)]).tolist()
+    media = {
+        start + label: number
+        for start, own in zip(starts, pages, strict=False)
+        for label, number in own.media.items()
+    }
+    return page.PageRun(
+        name=f"{runs[0].cfg.agent.name}, seeds {seeds}",
+        folder=", ".join(own.folder for own in pages),
+        settings=pages[0].settings,
+        privileged=pages[0].privileged,
+        # with one seed for all, so that the intervals are over all episodes of a source
+        results=summarise(episodes.assign(seed=0)),
+        episodes=episodes,
+        media=media,
+        seeds=across_seeds(pd.concat([own.results for own in pages])),
     )
 
 
@@ -115,7 +156,7 @@ def _settings(run: Run) -> str:
     cfg = run.cfg
     parts = {key: cfg[key].name for key in ("protocol", "acoustics", "split", "mapper", "planner")}
     parts |= {key: cfg[key] for key in ("look", "exploration", "localisation", "part", "episodes")}
-    parts |= {"seed": cfg.seed, "train_seed": cfg.train_seed}
+    parts["train_seed"] = cfg.train_seed
     return ", ".join(f"{key}={value}" for key, value in parts.items())
 
 

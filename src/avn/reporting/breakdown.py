@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -78,13 +78,17 @@ def _groups(episodes: pd.DataFrame, kind: str) -> pd.Series:
     return pd.Series(pd.Categorical(words, order, ordered=True), index=episodes.index)
 
 
-def breakdown_figure(runs: Mapping[str, pd.DataFrame]) -> Figure:
+def breakdown_figure(
+    runs: Mapping[str, pd.DataFrame], colours: Sequence[str] = RUN_COLOURS
+) -> Figure:
     """Draw success rate and SPL of runs by distance, sight and rooms crossed.
 
     Parameters
     ----------
     runs : mapping of str to DataFrame
         Records by the run's name.
+    colours : sequence of str
+        Of the runs.
 
     Returns
     -------
@@ -108,7 +112,7 @@ def breakdown_figure(runs: Mapping[str, pd.DataFrame]) -> Figure:
                     np.arange(len(groups)) + shift,
                     100 * own[title],
                     yerr=100 * off,
-                    color=RUN_COLOURS[index % len(RUN_COLOURS)],
+                    color=colours[index % len(colours)],
                     marker="o",
                     linestyle="-" if kind != "sight" else "none",
                     linewidth=1,

@@ -22,7 +22,7 @@ from avn.acoustics.dry_sounds import RATE
 from avn.errors import UserError
 from avn.modules.spectrogram import Spectrogram
 from avn.navigation.actions import HEADINGS
-from avn.navigation.trace import Trace
+from avn.navigation.trace import Thoughts, Trace
 from avn.reporting.sound_figures import draw_plan
 from avn.reporting.trajectory_figures import draw_place, extent, outcome, plan_of, title_of
 from avn.stages import written_whole
@@ -156,6 +156,11 @@ class _Stage:
         centres = trace.place.grid.centres
         (x0, y0), (x1, y1) = centres.min(0) - 1.2, centres.max(0) + 1.2
         axes.set(xlim=(x0, x1), ylim=(y0, y1))
+        self.recalled = None
+        if thoughts is not None and thoughts.retrieved is not None and trace.walk is not None:
+            walk = centres[trace.walk // HEADINGS]
+            axes.plot(*walk.T, color="0.45", lw=0.9, zorder=7)
+            (self.recalled,) = axes.plot([], [], "o", color="#7b3294", ms=8, alpha=0.8, zorder=8)
         (self.path,) = axes.plot([], [], color=_PATH, lw=2.6, zorder=9)
         (self.bumps,) = axes.plot([], [], "x", color="black", markersize=6, zorder=10)
         (self.agent,) = axes.plot([], [], color="white", mec=_PATH, mew=2.5, ms=18, zorder=11)
@@ -169,6 +174,9 @@ class _Stage:
         if self.belief is not None:
             words.append("green: believed to be free, brown: blocked")
         self.figure.text(484 / 1280, 34 / 720, "    ".join(words), fontsize=10, color="0.3")
+        if self.recalled is not None:
+            memory = "grey: the walk that it remembers, purple: places there that look most alike"
+            self.figure.text(484 / 1280, 12 / 720, memory, fontsize=10, color="0.3")
 
     def draw(self, step: int) -> NDArray[np.uint8]:
         """The picture of one step, (720, 1280, 3) uint8."""
@@ -185,12 +193,18 @@ class _Stage:
         if trace.heard is not None:
             self.heard.set_data(*trace.heard[step][:, None])
             self.ray.set_data(*np.stack((here, trace.heard[step])).T)
-        if self.belief is not None and trace.thoughts is not None:
-            assert trace.thoughts.free is not None
-            self.belief.set_data(trace.thoughts.free[min(step, len(trace.action) - 1)])
+        if trace.thoughts is not None:
+            self._believe(trace.thoughts, min(step, len(trace.action) - 1))
         self.caption.set_text(self._words(step))
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
+
+    def _believe(self, thoughts: Thoughts, step: int) -> None:
+        """Show what the agent took to be true when it chose its action."""
+        if self.belief is not None and thoughts.free is not None:
+            self.belief.set_data(thoughts.free[step])
+        if self.recalled is not None and thoughts.retrieved is not None:
+            self.recalled.set_data(*thoughts.retrieved[step, :, :2].T)
 
     def _words(self, step: int) -> str:
         count = len(self.trace.action)

@@ -11,6 +11,8 @@ import jinja2
 import pandas as pd
 
 from avn.errors import UserError
+from avn.reporting.breakdown import breakdown_figure
+from avn.reporting.page_media import figure_url
 from avn.reporting.results import ALL_SOUNDS, AVERAGE, compare
 from avn.reporting.table import PAPER, PAPER_PROTOCOL, paper_table
 from avn.reporting.trajectory_figures import RUN_COLOURS
@@ -32,6 +34,10 @@ class PageRun:
         `results.csv` and `episodes.csv`.
     media : dict of int to int
         By row of `episodes.csv`, the number of its embedded episode.
+    seeds : DataFrame, optional
+        Of several runs that differ in their seed alone: `results.across_seeds` of them.
+    within : bool
+        Whether it is one of such runs.
     """
 
     name: str
@@ -41,6 +47,8 @@ class PageRun:
     results: pd.DataFrame
     episodes: pd.DataFrame
     media: dict[int, int]
+    seeds: pd.DataFrame | None = None
+    within: bool = False
 
 
 def render(
@@ -49,7 +57,6 @@ def render(
     plans: Sequence[dict[str, Any]],
     views: Sequence[str],
     episodes: Sequence[dict[str, Any]],
-    breakdown: str,
 ) -> str:
     """The page as HTML, which asks for nothing from anywhere.
 
@@ -59,8 +66,6 @@ def render(
     runs : sequence of PageRun
     plans, views, episodes : sequences
         What the embedded episodes point at by number; see `avn.reporting.page_media`.
-    breakdown : str
-        The address of the figure of results by difficulty.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(_TEMPLATES),
@@ -90,7 +95,8 @@ def render(
         data=data,
         views=list(views),
         episodes=list(episodes),
-        breakdown=breakdown,
+        breakdown=_breakdown(runs),
+        base=next(run.name for run in runs if not run.within),
         differences=_differences(runs),
         licence="sortable-tablesort by Jonas Earendel, public domain (Unlicense)",
         # our own files, which must not be escaped within their elements
@@ -130,6 +136,7 @@ def _rows(index: int, run: PageRun, rooms: Sequence[str]) -> list[dict[str, Any]
                 cell[figure] = round(100 * found[figure], 2)
                 for end in _ENDS:
                     cell[f"{figure}_{end}"] = 100 * found[f"{figure}_{end}"]
+            cell["spread"] = _spread(run, str(sound), room)
             cells.append(cell)
         rows.append(
             {
@@ -144,17 +151,34 @@ def _rows(index: int, run: PageRun, rooms: Sequence[str]) -> list[dict[str, Any]
     return rows
 
 
+def _spread(run: PageRun, sound: str, room: str) -> tuple[float, float] | None:
+    """Standard deviation of success rate and SPL over the seeds, in points."""
+    if run.seeds is None:
+        return None
+    chosen = (run.seeds["sound"] == sound) & (run.seeds["room"] == room)
+    row = run.seeds[chosen].iloc[0]
+    return 100 * float(row["sr_std"]), 100 * float(row["spl_std"])
+
+
 def _differences(runs: Sequence[PageRun]) -> list[dict[str, Any]]:
     """How much better each run is than the first, where both walked the same episodes."""
     rows = []
-    for run in runs[1:]:
+    first, *others = (run for run in runs if not run.within)
+    for run in others:
         try:
-            table = compare(run.episodes, runs[0].episodes).set_index("figure")
+            table = compare(run.episodes, first.episodes).set_index("figure")
         except UserError:
             continue
         points = 100 * table.loc[["sr", "spl"], ["difference", "low", "high"]].to_numpy()
         rows.append({"name": run.name, "sr": points[0].tolist(), "spl": points[1].tolist()})
     return rows
+
+
+def _breakdown(runs: Sequence[PageRun]) -> str:
+    """The figure of results by difficulty, in the colours of the runs."""
+    own = {run.name: index for index, run in enumerate(runs) if not run.within}
+    episodes = {name: runs[index].episodes for name, index in own.items()}
+    return figure_url(breakdown_figure(episodes, [_colour(index) for index in own.values()]))
 
 
 def _paper() -> dict[tuple[str, ...], tuple[float, float]]:
