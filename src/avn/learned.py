@@ -139,9 +139,8 @@ class Outcome:
         """
         folder = stage_folder(cfg.outputs, self.stage, self.what, self.made_from)
         hashes = [digest(self.made_from, own) for own in apartments]
-        paths = [
-            folder / f"{scene.name}-{own[:8]}.h5" for scene, own in zip(chosen, hashes, strict=True)
-        ]
+        pairs = zip(chosen, hashes, strict=True)
+        paths = [self._path(cfg, scene, own) for scene, own in pairs]
 
         def make_missing() -> None:
             for scene, path, own in zip(chosen, paths, hashes, strict=True):
@@ -157,6 +156,17 @@ class Outcome:
             estimate=self.estimate,
         )
         return [self._read(path, own) for path, own in zip(paths, hashes, strict=True)]
+
+    def put(self, cfg: DictConfig, scene: Scene, apartment: str, found: Tensor) -> None:
+        """Keep what was found for an apartment on the way to something else, unless it is there."""
+        own = digest(self.made_from, apartment)
+        path = self._path(cfg, scene, own)
+        if not path.is_file():
+            self._write(path, own, found)
+
+    def _path(self, cfg: DictConfig, scene: Scene, made_from: str) -> Path:
+        folder = stage_folder(cfg.outputs, self.stage, self.what, self.made_from)
+        return folder / f"{scene.name}-{made_from[:8]}.h5"
 
     def _write(self, path: Path, made_from: str, found: Tensor) -> None:
         def fill(file: h5py.File) -> None:

@@ -213,7 +213,12 @@ def hearing(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
         Metres to the right and to the front.
     """
     model, _ = sound_model(cfg)
-    outcome = Outcome(
+    return _listen(cfg, chosen, model, hearing_outcome(cfg, chosen))
+
+
+def hearing_outcome(cfg: DictConfig, chosen: Sequence[Scene]) -> Outcome:
+    """The stage of `hearing`."""
+    return Outcome(
         stage="hear",
         what="-".join(sound_files(cfg)),
         kind="hearing",
@@ -223,7 +228,6 @@ def hearing(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
         title=f"what '{cfg.sound_model.name}' hears",
         estimate=_listening_time(cfg, chosen),
     )
-    return _listen(cfg, chosen, model, outcome)
 
 
 def stop_scores(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:

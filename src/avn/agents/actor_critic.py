@@ -36,7 +36,7 @@ class ActorCriticConfig(BaselineConfig):
         Whether it draws its actions, or takes the likeliest.
     """
 
-    width: int = 256
+    width: int = 128
     memory: int = 0
     map_width: int = WIDTH
     top: int = 3
@@ -67,7 +67,7 @@ class ActorCriticAgent(Agent):
     def __init__(
         self,
         network: ActorCritic | None = None,
-        width: int = 256,
+        width: int = 128,
         memory: int = 0,
         map_width: int = WIDTH,
         top: int = 3,

@@ -138,6 +138,7 @@ class PlannerAgent(Agent):
     def rest(self, done: Tensor) -> None:
         """Plan no more for episodes that are over."""
         self._running = ~done.numpy()
+        self.mapper.rest(done)
 
     def act(self, observation: TensorDict) -> Tensor:
         """One action for every episode, along the path planned now."""

@@ -84,6 +84,10 @@ class Mapper(ABC):
         """
         raise UserError(f"agent.truth: '{part}' is nothing that {type(self).__name__} can be shown")
 
+    def rest(self, done: Tensor) -> None:
+        """Be told which agents' episodes are over, (N,) bool, to save the work for them."""
+        return
+
     @abstractmethod
     def observe(self, observation: TensorDict, way: Tensor) -> None:
         """Take in the newest observations: find the agents, and bring map and graph up to date.

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import numba
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from tensordict import TensorDict
 from torch import Tensor
 
@@ -115,10 +118,29 @@ def around(log_odds: Tensor, row: Tensor, pose: Tensor, squares: Tensor) -> Tens
     (N, width, width) float32 tensor
         Probability that each square is free; 0.5 off the map.
     """
-    size, width = log_odds.shape[-1], round(squares.shape[1] ** 0.5)
+    width = round(squares.shape[1] ** 0.5)
+    found = np.empty((len(row), squares.shape[1]), dtype=np.float32)
+    _around(log_odds.numpy(), row.numpy(), pose.numpy(), squares.numpy(), found)
+    return torch.from_numpy(found).unflatten(1, (width, width))
+
+
+@numba.njit(cache=True)
+def _around(
+    log_odds: NDArray[np.float32],
+    row: NDArray[np.int64],
+    pose: NDArray[np.int64],
+    squares: NDArray[np.int64],
+    found: NDArray[np.float32],
+) -> None:
+    """Fill `found`, (N, width**2); a loop, since most of the work would be indices in tensors."""
+    size = log_odds.shape[-1]
     half = size // 2
-    there = squares[pose[:, 2]] + (pose[:, None, :2] + half)
-    inside = ((there >= 0) & (there < size)).all(dim=-1)
-    index = (row[:, None] * size + there[..., 1]) * size + there[..., 0]
-    found = log_odds.flatten()[torch.where(inside, index, 0)]
-    return torch.sigmoid(found).masked_fill(~inside, 0.5).unflatten(1, (width, width))
+    for n in range(len(row)):
+        right, front, heading = pose[n]
+        own = log_odds[row[n]]
+        for k in range(squares.shape[1]):
+            x, y = squares[heading, k, 0] + right + half, squares[heading, k, 1] + front + half
+            if 0 <= x < size and 0 <= y < size:
+                found[n, k] = np.float32(1.0) / (np.float32(1.0) + np.exp(-own[y, x]))
+            else:
+                found[n, k] = np.float32(0.5)

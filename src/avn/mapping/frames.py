@@ -29,7 +29,14 @@ class FrameVotes:
         self._voted = torch.zeros(n, HEADINGS * size * size, dtype=torch.bool)
         self._winner = torch.full((n,), -1)
 
-    def vote(self, pose: Tensor, similarity: Tensor, places: Tensor, confidence: float) -> Tensor:
+    def vote(
+        self,
+        pose: Tensor,
+        similarity: Tensor,
+        places: Tensor,
+        confidence: float,
+        rows: Tensor | None = None,
+    ) -> Tensor:
         """Count the votes of the newest pictures; a place and heading votes once.
 
         Parameters
@@ -41,6 +48,8 @@ class FrameVotes:
             Where similar pictures were taken in the walk.
         confidence : float
             Votes that a winner needs.
+        rows : (n,) int64 tensor, optional
+            Agents whose winner is looked for, by number; all by default.
 
         Returns
         -------
@@ -58,7 +67,7 @@ class FrameVotes:
         weight = torch.exp((similarity - 1) / self.sharpness)
         index = self._index(turn, shift.clamp(-self.centre, self.centre))
         self._votes.scatter_add_(1, index, torch.where(inside, weight, 0.0))
-        return self._elect(confidence)
+        return self._elect(confidence, torch.arange(len(pose)) if rows is None else rows)
 
     def settle(self, shift: Tensor, turn: Tensor) -> None:
         """Let the frames lie where they are told to, (N, 2) and (N,), whatever is voted."""
@@ -79,9 +88,11 @@ class FrameVotes:
         shift = torch.stack((square % self.size, square // self.size), dim=1) - self.centre
         return shift, turn, self._winner >= 0
 
-    def _elect(self, confidence: float) -> Tensor:
-        most, winner = self._votes.max(dim=1)
-        winner = torch.where(most >= confidence, winner, -1)
+    def _elect(self, confidence: float, rows: Tensor) -> Tensor:
+        everyone = len(rows) == len(self._votes)
+        most, best = (self._votes if everyone else self._votes[rows]).max(dim=1)
+        winner = self._winner.clone()
+        winner[rows] = torch.where(most >= confidence, best, -1)
         changed = winner != self._winner
         self._winner = winner
         return changed

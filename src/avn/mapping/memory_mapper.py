@@ -79,6 +79,7 @@ class MemoryMapper(Mapper):
         self.map = OccupancyMap(n, self.size)
         self.graph = PartialGraph(n, self.size, rules)
         self._last = torch.zeros(n, 3, dtype=torch.int64)
+        self._awake = torch.arange(n)
         self._memory: SpatialMemory | None = None
         self.retrieved = None
 
@@ -114,6 +115,10 @@ class MemoryMapper(Mapper):
         shift = lattice[start // HEADINGS] - lattice[first // HEADINGS]
         self._votes.settle(turned(shift, -heading % HEADINGS), (start - first) % HEADINGS)
 
+    def rest(self, done: Tensor) -> None:
+        """Look for the walks of agents that go on alone."""
+        self._awake = (~done).nonzero()[:, 0]
+
     def observe(self, observation: TensorDict, way: Tensor) -> None:
         """Find the agents, and bring map, memory and graph up to date."""
         if self._memory is None:
@@ -143,8 +148,14 @@ class MemoryMapper(Mapper):
         pose = observation["odometry"]
         squares = take_in(self.map, pose, self._last, observation, way, self.windows)
         similarity, places = self.retrieved = memory.recall(observation["feature"], own=False)
-        changed = self._votes.vote(pose, similarity, places, self.confidence)
-        wrong = ((self.map.log_odds <= -CERTAIN) & (self._laid >= CERTAIN)).flatten(1).any(dim=1)
+        awake = self._awake
+        changed = self._votes.vote(pose, similarity, places, self.confidence, awake)
+        if len(awake) == len(pose):
+            own, laid = self.map.log_odds, self._laid
+        else:
+            own, laid = self.map.log_odds[awake], self._laid[awake]
+        wrong = torch.zeros(len(pose), dtype=torch.bool)
+        wrong[awake] = ((own <= -CERTAIN) & (laid >= CERTAIN)).flatten(1).any(dim=1)
         changed |= self._votes.refuse(wrong)
         rows = changed.nonzero()[:, 0]
         if len(rows):

@@ -67,27 +67,27 @@ class A3CConfig:
     """
 
     workers: int = 2
-    episodes: int = 32
+    episodes: int = 64
     steps: int = 20
-    total: int = 4_000_000
+    total: int = 3_000_000
     order: str = "free"
     collector: str = "lean"
     lr: float = 7e-4
     alpha: float = 0.99
-    eps: float = 0.1
+    eps: float = 1e-5
     schedule: str = "linear"
     gamma: float = 0.99
     gae_lambda: float = 1.0
-    entropy: float = 0.01
+    entropy: float = 0.1
     value: float = 0.5
     clip: float = 40.0
     max_steps: int = 200
     reward: RewardConfig = field(default_factory=RewardConfig)
     takes: int = 4
     walks: int = 32
-    refresh: int = 50
-    validate_every: int = 200_000
-    validation_starts: int = 4
+    refresh: int = 100
+    validate_every: int = 250_000
+    validation_starts: int = 10
     train_seed: int = 0
 
     @property

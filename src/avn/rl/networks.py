@@ -37,7 +37,7 @@ class Shape:
 
     features: dict[str, int]
     actions: int
-    width: int = 256
+    width: int = 128
     memory: int = 0
     map_channels: int = 0
     map_width: int = 21
