@@ -94,7 +94,7 @@ def test_what_is_chosen_is_typical_and_from_everywhere():
     assert set(replay.choose(episodes(), "failure", 9)) == {2, 4}
     assert replay.choose(episodes()[episodes()["success"] == 1], "failure", 2) == []
     assert replay.choose(episodes(), "typical", 0) == []
-    with pytest.raises(UserError, match="film_show: 'best' is none of typical, success, failure"):
+    with pytest.raises(UserError, match="--show: 'best' is none of typical, success, failure"):
         replay.choose(episodes(), "best", 1)
 
 

@@ -142,7 +142,15 @@ def test_what_comes_from_names_is_shown_and_never_run(browser, tmp_path):
         "</script><script>window.bad=1</script><img src=x onerror=window.bad=1>\u2028'\"&amp;{{1}}"
     )
     row = {"agent": evil, "protocol": evil, "acoustics": evil, "look": evil, "sound": evil}
-    row |= {"room": evil, "seed": 0, "episode": 0, "source": 0, "outcome": evil, "geodesic": 2.0}
+    row |= {
+        "room": evil,
+        "seed": 0,
+        "episode": 0,
+        "source": 0,
+        "source_cell": 0,
+        "outcome": evil,
+        "geodesic": 2.0,
+    }
     row |= {"in_sight": 1, "rooms_crossed": 0, "actions": 3, "start_cell": 0, "start_heading": 0}
     row |= {"success": 1, "spl": 1.0, "softspl": 1.0, "sna": 1.0, "dtg": 0.0}
     episodes = pd.DataFrame([row])
@@ -214,3 +222,27 @@ def test_runs_of_several_seeds_stand_together_too(browser, command, outputs, cap
         assert shown.locator("#differences tbody th").all_inner_texts() == [
             "random_walk, seeds 0, 1"
         ]
+
+
+def test_the_ways_of_all_episodes_on_request(browser, command, outputs, capfd, tmp_path):
+    folder = made(command, outputs, "greedy")
+    path = tmp_path / "ways.html"
+    options = ["--paths", "--show", "success,failure", "--output", str(path)]
+    assert report.main([str(folder), *options]) == 0
+    episodes = pd.read_csv(folder / "episodes.csv")
+    with opened(browser, path) as shown:
+        shown.locator("td.cell[data-sound=all][data-room=average]").click()
+        rows = shown.locator("#episode-list tr.open")
+        assert rows.count() == len(episodes)
+        rows.first.click()
+        assert shown.locator("#sound").is_visible()
+        rows.last.click()
+        assert not shown.locator("#sound").is_visible()
+        number, sound = (rows.last.locator("td").nth(i).inner_text() for i in (3, 2))
+        row = episodes.query(f"episode == {number} and sound == '{sound}'").iloc[0]
+        assert shown.locator("#step").get_attribute("max") == str(row["actions"])
+        shown.locator("#step").fill(str(row["actions"]))
+        assert row["outcome"].replace("_", " ") in shown.locator("#caption").inner_text()
+        # it may be opened after one with sound, and that one again
+        rows.first.click()
+        until(shown, "document.getElementById('sound').readyState === 4")

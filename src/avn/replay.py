@@ -124,7 +124,7 @@ def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
         Index labels of `episodes`, the fittest first.
     """
     if show not in SHOWS:
-        raise UserError(f"film_show: '{show}' is none of {', '.join(SHOWS)}")
+        raise UserError(f"--show: '{show}' is none of {', '.join(SHOWS)}")
     chosen = episodes
     if show != "typical":
         chosen = episodes[episodes["success"] == (show == "success")]

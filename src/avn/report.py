@@ -17,6 +17,7 @@ import pandas as pd
 from avn import replay
 from avn.cli import plainly
 from avn.errors import UserError
+from avn.navigation.trace import Trace
 from avn.perceived import Perceived, soundtrack
 from avn.replay import Run
 from avn.reporting import page, page_media
@@ -39,7 +40,16 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         metavar="N",
         help="episodes of each room and sound with views and sound, 0 for none (1)",
     )
-    parser.add_argument("--show", default="typical", help=f"which: {', '.join(replay.SHOWS)}")
+    parser.add_argument(
+        "--show",
+        default="typical",
+        help="which: typical, success, failure, or several of them with commas",
+    )
+    parser.add_argument(
+        "--paths",
+        action="store_true",
+        help="the ways of all other episodes too; walks each run to its end, some minutes",
+    )
     parser.add_argument("--output", type=Path, help="the file (outputs/report/report-<hash8>.html)")
     return parser.parse_args(arguments)
 
@@ -51,8 +61,8 @@ def _report(options: argparse.Namespace) -> None:
     folders = [run.folder.resolve() for run in runs]
     if len(set(folders)) < len(folders):
         raise UserError("RUN: a folder is given twice; name each run once")
-    html = build(runs, options.episodes, options.show)
-    asked = ([str(path) for path in folders], options.episodes, options.show)
+    html = build(runs, options.episodes, options.show, options.paths)
+    asked = ([str(path) for path in folders], options.episodes, options.show, options.paths)
     default = stage_folder(runs[0].cfg.outputs, "report", "report", digest(*asked))
     output: Path = options.output or default.with_name(default.name + ".html")
     try:
@@ -64,7 +74,7 @@ def _report(options: argparse.Namespace) -> None:
     tell(str(output))
 
 
-def build(runs: Sequence[Run], count: int, show: str) -> str:
+def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> str:
     """The page of some runs as HTML.
 
     Parameters
@@ -72,8 +82,11 @@ def build(runs: Sequence[Run], count: int, show: str) -> str:
     runs : sequence of Run
     count : int
         Episodes of each room and sound that are embedded with views and sound.
-    show : {"typical", "success", "failure"}
-        Which; as `avn.replay.choose`, of the first run, and the same ones of the others.
+    show : str
+        Which, one or more of typical, success and failure with commas; as `avn.replay.choose`, of
+        the first run, and the same ones of the others.
+    paths : bool
+        Whether the ways of all other episodes are embedded too.
     """
     names = replay.names_of(runs)
     groups = _seed_groups(runs)
@@ -81,10 +94,10 @@ def build(runs: Sequence[Run], count: int, show: str) -> str:
     media = _Media()
     pages = []
     for index, (run, labels) in enumerate(zip(runs, _chosen(runs, count, show), strict=True)):
-        if labels:
-            tell(f"{run.folder}: walking {len(labels)} episodes again")
+        if labels or paths:
+            tell(f"{run.folder}: walking {'all' if paths else len(labels)} episodes again")
         # the runs of several seeds taken together stand first
-        embedded = media.add(run, len(groups) + index, labels) if labels else {}
+        embedded, ways = media.add(run, len(groups) + index, labels, paths)
         pages.append(
             page.PageRun(
                 name=names[index],
@@ -94,6 +107,7 @@ def build(runs: Sequence[Run], count: int, show: str) -> str:
                 results=run.results,
                 episodes=run.episodes,
                 media=embedded,
+                ways=ways,
                 within=index in within,
             )
         )
@@ -135,6 +149,7 @@ def _together(runs: Sequence[Run], pages: Sequence[page.PageRun]) -> page.PageRu
         results=summarise(episodes.assign(seed=0)),
         episodes=episodes,
         media=media,
+        ways=[way for own in pages for way in own.ways or []] or None,
         seeds=across_seeds(pd.concat([own.results for own in pages])),
     )
 
@@ -147,7 +162,8 @@ def _chosen(runs: Sequence[Run], count: int, show: str) -> Iterator[list[int]]:
         labels: list[int] = []
         for _, part in run.episodes.groupby(["room", "sound"], sort=False):
             shared = [int(label) for label in part.index if keys[label] in chosen]
-            labels += (shared or replay.choose(part, show, count))[:count]
+            each = [replay.choose(part, word, count) for word in show.split(",")]
+            labels += shared or list(dict.fromkeys(label for own in each for label in own))
         chosen |= {keys[label] for label in labels}
         yield labels
 
@@ -171,19 +187,28 @@ class _Media:
         self._plan_of: dict[str, int] = {}
         self._view_of: dict[tuple[str, str, int], int] = {}
 
-    def add(self, run: Run, index: int, labels: Sequence[int]) -> dict[int, int]:
-        """Embed episodes of a run; gives the number of each."""
-        perceived = Perceived(run)
-        traces = replay.traces(run, labels)
+    def add(
+        self, run: Run, index: int, labels: Sequence[int], paths: bool
+    ) -> tuple[dict[int, int], list[dict[str, Any]] | None]:
+        """Embed episodes of a run; gives the number of each, and all ways if asked for."""
+        if not labels and not paths:
+            return {}, None
+        every = run.episodes.index.tolist() if paths else []
+        traces, walked = replay.walk_again(run, [(labels, True), (every, False)])
+        ways = [{"plan": self._plan(own), "states": own.state.tolist()} for own in walked]
+        return self._embed(run, index, labels, traces), ways or None
+
+    def _embed(
+        self, run: Run, index: int, labels: Sequence[int], traces: Sequence[Trace]
+    ) -> dict[int, int]:
+        perceived = Perceived(run) if labels else None
         keys = replay.episode_keys(run.episodes.loc[list(labels)])
         numbers = {}
         for label, key, trace in zip(labels, keys, traces, strict=True):
-            place = str(getattr(trace.place, "folder", trace.place.name))
-            if place not in self._plan_of:
-                self._plan_of[place] = len(self.plans)
-                self.plans.append(page_media.plan_of_place(trace.place))
+            assert perceived is not None
+            place = self._key(trace)
             own = page_media.episode_media(trace, soundtrack(perceived.clips(trace)))
-            own |= {"run": index, "plan": self._plan_of[place]}
+            own |= {"run": index, "plan": self._plan(trace)}
             renderer = (place, str(run.cfg.renderer.name))
             own["views"] = [self._view(perceived, trace, *renderer, int(s)) for s in trace.state]
             numbers[int(label)] = len(self._episodes)
@@ -191,7 +216,19 @@ class _Media:
             self._keys.append((place, *key))
         return numbers
 
-    def _view(self, perceived: Perceived, trace: Any, place: str, name: str, state: int) -> int:
+    @staticmethod
+    def _key(trace: Trace) -> str:
+        return str(getattr(trace.place, "folder", trace.place.name))
+
+    def _plan(self, trace: Trace) -> int:
+        """The number of an apartment's plan."""
+        place = self._key(trace)
+        if place not in self._plan_of:
+            self._plan_of[place] = len(self.plans)
+            self.plans.append(page_media.plan_of_place(trace.place))
+        return self._plan_of[place]
+
+    def _view(self, perceived: Perceived, trace: Trace, place: str, name: str, state: int) -> int:
         key = (place, name, state)
         if key not in self._view_of:
             self._view_of[key] = len(self.views)

@@ -34,6 +34,8 @@ class PageRun:
         `results.csv` and `episodes.csv`.
     media : dict of int to int
         By row of `episodes.csv`, the number of its embedded episode.
+    ways : list of dict, optional
+        Of each episode the number of its `plan` and the `states` of its way.
     seeds : DataFrame, optional
         Of several runs that differ in their seed alone: `results.across_seeds` of them.
     within : bool
@@ -47,6 +49,7 @@ class PageRun:
     results: pd.DataFrame
     episodes: pd.DataFrame
     media: dict[int, int]
+    ways: list[dict[str, Any]] | None = None
     seeds: pd.DataFrame | None = None
     within: bool = False
 
@@ -81,7 +84,12 @@ def render(
         "all": ALL_SOUNDS,
         "plans": list(plans),
         "runs": [
-            {"name": run.name, "colour": _colour(index), "episodes": _episodes(run)}
+            {
+                "name": run.name,
+                "colour": _colour(index),
+                "episodes": _episodes(run),
+                "ways": run.ways is not None,
+            }
             for index, run in enumerate(runs)
         ],
     }
@@ -96,6 +104,7 @@ def render(
         views=list(views),
         episodes=list(episodes),
         breakdown=_breakdown(runs),
+        any_ways=any(run.ways for run in runs),
         base=next(run.name for run in runs if not run.within),
         differences=_differences(runs),
         licence="sortable-tablesort by Jonas Earendel, public domain (Unlicense)",
@@ -206,6 +215,10 @@ def _episodes(run: PageRun) -> list[list[Any]]:
             round(float(row["spl"]), 3),
             int(row["actions"]),
             run.media.get(int(label)),
+            place,
+            int(row["source_cell"]),
         ]
-        for label, row in zip(run.episodes.index, run.episodes.to_dict("records"), strict=True)
+        for place, (label, row) in enumerate(
+            zip(run.episodes.index, run.episodes.to_dict("records"), strict=True)
+        )
     ]

@@ -42,7 +42,7 @@ def figure_url(figure: Figure) -> str:
 
 
 def plan_of_place(place: Place) -> dict[str, Any]:
-    """The picture of an apartment from above, and where it lies: left, top, width, height, m."""
+    """The picture of an apartment from above, where it lies and its cells, all in metres."""
     low, high = place.grid.centres.min(axis=0) - _ROUND, place.grid.centres.max(axis=0) + _ROUND
     width, height = (high - low).tolist()
     figure = Figure(figsize=(width, height), dpi=_PIXELS_A_METRE)
@@ -51,7 +51,7 @@ def plan_of_place(place: Place) -> dict[str, Any]:
     draw_apartment(axes, place)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     place_ = {"left": float(low[0]), "top": float(high[1]), "width": width, "height": height}
-    return {"image": figure_url(figure), **place_}
+    return {"image": figure_url(figure), "cells": _rounded(place.grid.centres), **place_}
 
 
 def view_url(view: NDArray[np.uint8]) -> str:

@@ -39,16 +39,19 @@
     at("episodes-title").textContent =
       `${own.name}, ${sound}, ${room.replaceAll("_", " ")}: ${rows.length} episodes`;
     const body = at("episode-list").tBodies[0];
-    body.replaceChildren(...rows.map((row) => line(row)));
+    body.replaceChildren(...rows.map((row) => line(row, own)));
+    at("episode-list").dataset.run = run;
     at("episode-list").querySelectorAll("th").forEach((th) => th.removeAttribute("aria-sort"));
     at("episodes").hidden = false;
     at("episodes").scrollIntoView({ block: "start" });
   }
 
-  function line(row) {
-    const [room, sound, number, metres, sight, doors, outcome, spl, actions, media] = row;
+  function line(row, run) {
+    const [room, sound, number, metres, sight, doors, outcome, spl, actions, media, place] = row;
+    const opens = media !== null || run.ways;
+    const mark = media !== null ? "\u266B" : opens ? "\u219D" : "";
     const tr = document.createElement("tr");
-    const texts = [media === null ? "" : "\u266B", room.replaceAll("_", " "), sound, number,
+    const texts = [mark, room.replaceAll("_", " "), sound, number,
       metres.toFixed(1), sight ? "in sight" : "out of sight", doors,
       outcome.replaceAll("_", " "), spl.toFixed(2), actions];
     texts.forEach((text, index) => {
@@ -58,10 +61,10 @@
       if (index === 0) td.dataset.sort = media === null ? 1 : 0;
       tr.append(td);
     });
-    tr.className = media === null ? "closed" : "open";
-    if (media !== null) {
+    tr.className = opens ? "open" : "closed";
+    if (opens) {
       tr.tabIndex = 0;
-      tr.dataset.media = media;
+      Object.assign(tr.dataset, { media, place });
     }
     return tr;
   }
@@ -69,16 +72,33 @@
   at("episode-list").addEventListener("click", (event) => {
     const row = event.target.closest("tr.open");
     if (row) {
-      open(Number(row.dataset.media));
+      const { media, place } = row.dataset;
+      if (media === "null") open(way_of(Number(at("episode-list").dataset.run), Number(place)));
+      else open(embedded(Number(media)));
       at("episode").scrollIntoView({ block: "start" });
     }
   });
 
-  function open(media) {
+  const embedded = (media) => ({ media, ...read(`episode-${media}`) });
+
+  // An episode of which the page holds the way alone.
+  function way_of(run, place) {
+    const { plan, states } = read(`ways-${run}`)[place];
+    const [room, sound, number, metres, , , outcome, spl, actions] = data.runs[run].episodes[place];
+    const cells = data.plans[plan].cells;
+    const goal = cells[data.runs[run].episodes[place][11]];
+    const path = states.map((state) => [...cells[state >> 2], state & 3]);
+    const end = `${outcome.replaceAll("_", " ")}, SPL ${spl.toFixed(2)}, ${actions} actions`;
+    const title = `${room}, ${sound}, episode ${number}: source ${metres.toFixed(1)} m away`;
+    return { run, plan, title, goal, path, outcome: end, heard: null, belief: null, memory: null,
+      twins: [], media: null };
+  }
+
+  function open(own) {
     views = views ?? read("views");
-    const own = read(`episode-${media}`);
     const plan = data.plans[own.plan];
-    shown = { media, own, plan, others: own.twins.filter((twin) => twin !== media) };
+    shown = { own, plan, others: own.twins.filter((twin) => twin !== own.media) };
+    at("senses").classList.toggle("silent", !own.sound);
     at("episode").hidden = false;
     at("episode-title").textContent = own.title;
     at("twins").replaceChildren(...own.twins.map(choose));
@@ -88,20 +108,21 @@
     shown.belief = own.belief &&
       Uint8Array.from(atob(own.belief.free), (letter) => letter.charCodeAt(0));
     at("step").max = own.path.length - 1;
-    at("sound").src = own.sound;
-    shown.ghosts = shown.others.map((twin) => read(`episode-${twin}`));
+    if (own.sound) at("sound").src = own.sound;
+    else at("sound").removeAttribute("src");
+    shown.ghosts = shown.others.map(embedded);
     step(0);
   }
 
   function choose(media) {
-    const own = media === shown.media ? shown.own : read(`episode-${media}`);
+    const own = media === shown.own.media ? shown.own : embedded(media);
     const button = document.createElement("button");
     const swatch = document.createElement("i");
     swatch.className = "swatch";
     swatch.style.background = data.runs[own.run].colour;
     button.append(swatch, `${data.runs[own.run].name}: ${own.outcome}`);
-    button.setAttribute("aria-pressed", String(media === shown.media));
-    button.addEventListener("click", () => open(media));
+    button.setAttribute("aria-pressed", String(media === shown.own.media));
+    button.addEventListener("click", () => open(own));
     return button;
   }
 
@@ -124,13 +145,14 @@
     const { own } = shown;
     shown.step = index;
     at("step").value = index;
-    at("view").src = views[own.views[index]];
+    if (own.views) at("view").src = views[own.views[index]];
     const [x, y, heading] = own.path[index];
     const last = own.path.length - 1;
-    const bump = own.collided[index] ? ", ran into something" : "";
-    const next = index === last ? own.outcome : `next: ${ACTIONS[own.action[index]]}`;
+    const bump = own.collided?.[index] ? ", ran into something" : "";
+    const next = own.action && index < last ? `; next: ${ACTIONS[own.action[index]]}` : "";
+    const end = index === last ? `; ${own.outcome}` : "";
     at("caption").textContent =
-      `step ${index} of ${last}, facing ${HEADINGS[heading]}${bump}; ${next}`;
+      `step ${index} of ${last}, facing ${HEADINGS[heading]}${bump}${next}${end}`;
     const colour = data.runs[own.run].colour;
     const marks = shown.ghosts.map((ghost) => way(ghost.path, data.runs[ghost.run].colour, 0.03));
     if (own.memory) marks.unshift(...recalled(index));
@@ -199,14 +221,14 @@
   const within = (index) => Math.max(0, Math.min(index, shown.own.path.length - 1));
   function go(index) {
     step(within(index));
-    at("sound").currentTime = within(index) + 0.001;
+    if (shown.own.sound) at("sound").currentTime = within(index) + 0.001;
   }
   at("step").addEventListener("input", () => go(Number(at("step").value)));
   at("back").addEventListener("click", () => go(shown.step - 1));
   at("on").addEventListener("click", () => go(shown.step + 1));
   at("show-belief").addEventListener("change", () => believe(shown.step));
   function follow() {
-    if (!shown) return;
+    if (!shown?.own.sound) return;
     const now = within(Math.floor(at("sound").currentTime));
     if (now !== shown.step) step(now);
     if (!at("sound").paused) requestAnimationFrame(follow);
