@@ -266,6 +266,20 @@ def test_reproduce_runs_the_rows_that_are_named(command, outputs):
     best = results[(results["agent"] == "oracle") & (results["room"] == "average")]
     assert best["sr"].to_numpy() == pytest.approx(1)
     assert best["spl"].to_numpy() == pytest.approx(1)
+    files = {path.name for path in Path(out[-1]).iterdir()}
+    assert {"across_seeds.csv", "cells.csv", "table.md", "table.tex"} <= files
+    assert any(line.startswith("oracle: 100.0 / 100.0 after") for line in out)
+
+
+def test_reproduce_takes_the_sounds_that_are_named(command, outputs):
+    options = (f"outputs={outputs}", "split=mini", "rows=random_walk", "seeds=0")
+    code, out, err = command("reproduce", *options, "sounds=ring,clock")
+    assert code == 0, err
+    results = pd.read_csv(Path(out[-1]) / "results.csv")
+    assert set(results["sound"]) == {"ring", "clock", "all"}
+    code, _, err = command("reproduce", *options, "sounds=bark")
+    assert code == 2
+    assert "sounds: 'bark' is none of ring, alarm, clock" in err[-1]
 
 
 def test_sounds_may_be_a_list_with_paths(command, outputs, tmp_path):

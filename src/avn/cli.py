@@ -27,7 +27,7 @@ from omegaconf.errors import OmegaConfBaseException
 from avn import config, sound_files, sweeps
 from avn.errors import UserError
 
-LIST_KEYS = ("rows", "seeds", "train_seeds", "apartments")
+LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments")
 USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
 
 

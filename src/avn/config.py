@@ -115,6 +115,7 @@ class ReproduceConfig(CoreConfig):
     """Schema of `reproduce.yaml`."""
 
     rows: list[str] = MISSING
+    sounds: list[str] = MISSING
     seeds: list[int] = MISSING
     train_seeds: list[int] = MISSING
 

@@ -23,6 +23,11 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 
 from avn.errors import UserError
 
+# Seconds that each stage of this process took, by name, without those of the stages it made on the
+# way; and the stages that are being made, with the seconds of what they made on the way.
+spent: dict[str, float] = {}
+_within: list[float] = []
+
 
 def digest(*parts: Any) -> str:
     """SHA-256, in hex, of plain values, configs and dataclasses; order of keys is of no account."""
@@ -97,8 +102,16 @@ def make_once(
             return
         tell(f"{what} is missing: making it" + (f" ({estimate})" if estimate else ""))
         started = time.perf_counter()
-        make()
-        tell(f"{what} made in {time.perf_counter() - started:.0f} s: {folder}")
+        _within.append(0.0)
+        try:
+            make()
+        finally:
+            inner = _within.pop()
+        seconds = time.perf_counter() - started
+        spent[what] = spent.get(what, 0.0) + seconds - inner
+        if _within:
+            _within[-1] += seconds
+        tell(f"{what} made in {seconds:.0f} s: {folder}")
 
 
 @contextmanager

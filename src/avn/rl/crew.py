@@ -160,11 +160,13 @@ def _work(
     except (EOFError, KeyboardInterrupt):
         return
     except UserError as error:
-        link.send(("refused", str(error)))
+        answer = ("refused", str(error))
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{os.path.basename(last.filename)}:{last.lineno}"
-        link.send(("died", f"{type(error).__name__}: {error} ({where})"))
+        answer = ("died", f"{type(error).__name__}: {error} ({where})")
+    with suppress(OSError):  # where nobody listens any more
+        link.send(answer)
 
 
 def start_crew(task: Task, shared: SharedState, states: list[dict[str, Any]]) -> Crew:

@@ -1,0 +1,68 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from avn.reporting.published import latex, markdown, published
+from avn.reporting.results import EPISODE_COLUMNS, summarise
+from avn.reporting.table import paper_table
+
+
+def episodes(seed: int, share: float, agent: str = "greedy") -> pd.DataFrame:
+    """Episodes of two rooms and two sounds, of which a share succeeds with an SPL of a half."""
+    rows = []
+    generator = np.random.default_rng(seed)
+    for room in ("room_1", "room_2"):
+        for sound in ("ring", "a_b"):
+            for number in range(40):
+                row = dict.fromkeys(EPISODE_COLUMNS, 0)
+                row |= {"agent": agent, "protocol": "var", "acoustics": "resonance", "look": "once"}
+                row |= {"room": room, "sound": sound, "seed": seed, "episode": number}
+                row["source"], row["outcome"] = number % 5, "success"
+                row["success"] = int(generator.random() < share)
+                row["spl"] = row["success"] / 2
+                rows.append(row)
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture
+def table():
+    walked = pd.concat([episodes(0, 0.3), episodes(1, 0.5)])
+    return published(summarise(walked), walked), walked
+
+
+def test_cells_are_means_over_seeds_beside_the_papers_own(table):
+    cells, walked = table
+    one = cells[(cells["room"] == "room_1") & (cells["sound"] == "ring")].iloc[0]
+    own = walked[(walked["room"] == "room_1") & (walked["sound"] == "ring")]
+    assert one["sr"] == pytest.approx(100 * own["success"].mean())
+    assert one["spl"] == pytest.approx(50 * own["success"].mean())
+    each = own.groupby("seed")["success"].mean()
+    assert one["sr_std"] == pytest.approx(100 * each.std(ddof=1))
+    assert one["sr_low"] < one["sr"] < one["sr_high"]
+    paper = paper_table().set_index(["agent", "sound", "room"]).loc[("greedy", "ring", "room_1")]
+    assert (one["paper_sr"], one["paper_spl"]) == (paper["sr"], paper["spl"])
+
+
+def test_the_average_is_that_of_the_rooms(table):
+    cells, _ = table
+    ring = cells[cells["sound"] == "ring"].set_index("room")["sr"]
+    assert ring["average"] == pytest.approx(ring[["room_1", "room_2"]].mean())
+
+
+def test_markdown_has_a_line_for_each_agent_and_an_interval_in_the_average(table):
+    cells, _ = table
+    text = markdown(cells, ["ring", "a_b"])
+    assert "### ring" in text and "### all" in text  # noqa: PT018
+    line = next(line for line in text.splitlines() if line.startswith("| `greedy`"))
+    assert line.count("|") == 5
+    assert line.count("[") == 1
+    assert "(" in line
+
+
+def test_latex_escapes_names_and_has_as_many_cells_as_columns(table):
+    cells, _ = table
+    text = latex(cells, ["ring", "a_b"])
+    assert r"a\_b" in text
+    lines = [line for line in text.splitlines() if "&" in line]
+    assert {line.count("&") for line in lines} == {4}
+    assert "NaN" not in text and "nan" not in text  # noqa: PT018
