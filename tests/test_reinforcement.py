@@ -8,6 +8,7 @@ import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from avn.learned import METRICS
+from avn.reporting.model_card import CARD
 from avn.rl.a3c import BEST, CURVE, LAST
 
 ROWS = ("a3c_v", "a3c_va", "a3c_va_mapper", "a3c_va_m", "a3c_va_m_mapper")
@@ -58,7 +59,7 @@ def test_a_row_is_trained_measured_and_walks(command, outputs, row):
     assert code == 0, err
     folder = Path(out[-1])
     assert folder.name.startswith(f"{row}-")
-    assert {BEST, LAST, CURVE, METRICS} <= {path.name for path in folder.iterdir()}
+    assert {BEST, LAST, CURVE, METRICS, CARD} <= {path.name for path in folder.iterdir()}
     curve = json.loads((folder / CURVE).read_text())
     assert [own["steps"] for own in curve] == [0, 400, 800]
     events = EventAccumulator(str(folder)).Reload().Tags()["scalars"]

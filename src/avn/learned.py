@@ -14,11 +14,13 @@ import torch
 from omegaconf import DictConfig
 from torch import Tensor
 
+from avn import pipeline
 from avn.dataset import scene_file
 from avn.dataset.scene import Scene
 from avn.errors import UserError
 from avn.modules import training
 from avn.modules.network import Network
+from avn.reporting.model_card import write_card
 from avn.stages import digest, file_hash, make_once, stage_folder, written_whole
 
 METRICS, CHECKSUM = "metrics.json", "best.ckpt sha256"
@@ -64,6 +66,7 @@ def trained(
         metrics[CHECKSUM] = file_hash(folder / training.BEST)
         with written_whole(folder / METRICS) as part:
             part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+        write_card(folder, title, apartments(cfg), dict(model.hparams), metrics)
 
     make_once(
         folder,
@@ -78,6 +81,16 @@ def trained(
     if read_metrics(folder).get(CHECKSUM) != file_hash(best):
         raise UserError(f"{best}: changed since it was trained; delete {folder} to train again")
     return model
+
+
+def apartments(cfg: DictConfig) -> dict[str, str]:
+    """What networks are trained and measured on, for their cards."""
+    plans = pipeline.plans(cfg)
+    names = {part: ", ".join(plan.name for plan in plans[part]) for part in ("train", "validation")}
+    setting = f"split `{cfg.split.name}`, acoustics `{cfg.acoustics.name}`"
+    return {"setting": setting, "training apartments": names["train"]} | {
+        "validation apartments": names["validation"]
+    }
 
 
 def read_metrics(folder: Path) -> dict[str, Any]:

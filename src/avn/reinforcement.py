@@ -20,10 +20,11 @@ from avn.agents.actor_critic import ActorCriticAgent, ActorCriticConfig
 from avn.dataset import build
 from avn.dataset.scene import Scene
 from avn.errors import UserError
-from avn.learned import CHECKSUM, METRICS, read_metrics
+from avn.learned import CHECKSUM, METRICS, apartments, read_metrics
 from avn.navigation.episodes import frozen_episodes
 from avn.navigation.protocols import Protocol
 from avn.navigation.run import Labels, walk_room
+from avn.reporting.model_card import write_card
 from avn.rl.a3c import BEST, MONITOR, Training, load_network
 from avn.rl.config import A3CConfig, check_recipe
 from avn.rl.explorations import draw_walks
@@ -219,6 +220,10 @@ def _train(cfg: DictConfig, recipe: A3CConfig, folder: Path, made_from: str) -> 
     metrics |= {"seconds": time.perf_counter() - started, CHECKSUM: file_hash(folder / BEST)}
     with written_whole(folder / METRICS) as part:
         part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+    title = f"Actor-critic agent '{cfg.agent.name}' ({cfg.acoustics.name}, {cfg.protocol.name})"
+    recipe_of = {"baseline": cfg.baseline, "a3c": cfg.a3c, "protocol": cfg.protocol}
+    plain = {name: OmegaConf.to_container(node, resolve=True) for name, node in recipe_of.items()}
+    write_card(folder, title, apartments(cfg), plain, metrics)
 
 
 def _sizes(tables: Tables) -> dict[str, int]:

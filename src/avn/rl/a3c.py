@@ -73,7 +73,8 @@ class Training:
         """
         recipe = self.task.recipe
         updates = max(1, recipe.total // (recipe.batch * recipe.workers))
-        each = min(updates, max(1, recipe.validate_every // (recipe.batch * recipe.workers)))
+        planned = max(1, round(recipe.total / recipe.validate_every))
+        each = -(-updates // min(planned, updates))
         last = -(-updates // each)
         if rounds is not None:
             last = min(last, len(self._rounds()) + rounds)
