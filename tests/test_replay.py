@@ -5,9 +5,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import torch
+from hydra import compose, initialize_config_dir
+from omegaconf import OmegaConf
 from small import EYES, SMALL
 
 from avn import evaluation, listening, replay
+from avn.cli import conf_folder
+from avn.config import register
 from avn.errors import UserError
 from avn.perceived import Perceived
 from avn.reporting.results import write_csv
@@ -36,6 +40,16 @@ def test_a_run_is_walked_again_from_its_own_config(command, outputs, agent):
     assert (traces[0].heard is None) == (agent == "random_walk")
     assert (traces[0].thoughts is None) == (agent in ("random_walk", "greedy"))
     assert (traces[0].walk is None) == (agent != "ours_exp")
+
+
+@pytest.mark.parametrize("row", sorted(path.stem for path in (conf_folder() / "agent").iterdir()))
+def test_a_config_that_was_written_and_read_makes_the_same(row):
+    register()
+    with initialize_config_dir(str(conf_folder()), version_base="1.3"):
+        cfg = compose("eval", [f"agent={row}", "split=mini", "sound=clock", "planner.detour=3"])
+    again = replay._typed(OmegaConf.create(OmegaConf.to_yaml(cfg, resolve=True)))
+    assert OmegaConf.to_container(again) == OmegaConf.to_container(cfg, resolve=True)
+    assert evaluation.run_hash(again) == evaluation.run_hash(cfg)
 
 
 def test_the_clips_of_a_trace_are_those_that_the_network_heard(command, outputs):
