@@ -63,7 +63,7 @@ def test_a_row_is_trained_measured_and_walks(command, outputs, row):
     curve = json.loads((folder / CURVE).read_text())
     assert [own["steps"] for own in curve] == [0, 400, 800]
     events = EventAccumulator(str(folder)).Reload().Tags()["scalars"]
-    wanted = {"success", "spl"}
+    wanted = {"return", "success", "spl"}
     wanted = {f"{part}/{name}" for part in ("training", "validation") for name in wanted}
     rates = {"train/return", "train/entropy", "loss/value", "train/gradient_norm"}
     assert wanted | rates | {"train/steps_per_second"} <= set(events)

@@ -26,7 +26,7 @@ from avn.navigation.protocols import Protocol
 from avn.navigation.run import Labels, walk_room
 from avn.reporting.model_card import write_card
 from avn.rl.a3c import BEST, MONITOR, Training, load_network
-from avn.rl.config import A3CConfig, check_recipe
+from avn.rl.config import A3CConfig, RewardConfig, check_recipe
 from avn.rl.explorations import draw_walks
 from avn.rl.networks import ActorCritic, Shape
 from avn.rl.starts import build_starts
@@ -243,6 +243,13 @@ def _walks(cfg: DictConfig, rooms: Sequence[Scene], tables: Tables) -> Tensor | 
     return draw_walks([*rooms], tables, cfg.a3c.walks, steps, cfg.a3c.train_seed)
 
 
+def _returns(walked: pd.DataFrame, reward: RewardConfig) -> pd.Series:
+    """What each episode would have earned in training, not discounted."""
+    success, collisions = walked["success"], walked["collisions"]
+    others = walked["actions"] - success - collisions
+    return success * reward.success + collisions * reward.collision + others * reward.step
+
+
 class Measure:
     """How a network does on training and validation apartments, under the protocol."""
 
@@ -252,7 +259,7 @@ class Measure:
         self._labels = Labels(agent=cfg.agent.name, acoustics=cfg.acoustics.name)
 
     def __call__(self, network: ActorCritic) -> dict[str, float]:
-        """Success rate and SPL, such as `validation/spl`."""
+        """Return, success rate and SPL, such as `validation/spl`."""
         found = {}
         given = parts(self._cfg, ready=False)
         options: Any = OmegaConf.to_container(self._cfg.baseline, resolve=True)
@@ -264,6 +271,7 @@ class Measure:
                 walk_room(agent, room, self._episodes(room), self._protocol, self._labels, *senses)
                 for room, *senses in zip(rooms, hearing, sights, strict=True)
             )
+            found[f"{name}/return"] = float(_returns(walked, self._cfg.a3c.reward).mean())
             found[f"{name}/success"] = float(walked["success"].mean())
             found[f"{name}/spl"] = float(walked["spl"].mean())
         return found
