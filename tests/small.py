@@ -24,3 +24,16 @@ EYES = (
     "mapper.network.times=1",
     "mapper.network.validation_views=40",
 )
+# An actor-critic row that has learnt nothing.
+A3C = (
+    "protocol.exploration=30",
+    "a3c.workers=1",
+    "a3c.episodes=8",
+    "a3c.steps=5",
+    "a3c.total=400",
+    "a3c.validate_every=400",
+    "a3c.validation_starts=1",
+    "a3c.takes=1",
+    "a3c.walks=2",
+    "a3c.refresh=5",
+)
