@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import torch
@@ -15,7 +15,7 @@ from avn.mapping.ego_map import WIDTH, EgoMap, around, offsets
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.navigation.protocols import Protocol
 from avn.rl.explorations import explored, with_unknown_walk
-from avn.rl.networks import ActorCritic, sample
+from avn.rl.networks import ActorCritic, first_of
 
 
 @dataclass
@@ -91,6 +91,8 @@ class ActorCriticAgent(Agent):
         """Begin N new episodes, of which nothing is remembered."""
         super().reset(n, generator, protocol)
         network = self._trained()
+        # The episodes that are worked on, by number, and those of them that go on.
+        self._rows, self._awake = torch.arange(n), torch.ones(n, dtype=torch.bool)
         self._h, self._c = network.no_memory(n)
         self._map = EgoMap(n, self.map_size, self.map_width) if self.maps else None
         self._actions: Tensor | None = None
@@ -115,9 +117,35 @@ class ActorCriticAgent(Agent):
             memory = SpatialMemory(keys, values, walk, self.top)
             self._walked = OccupancyWalk(memory, ego.map.log_odds, walk, offsets(self.map_width))
 
-    @torch.no_grad()
+    def rest(self, done: Tensor) -> None:
+        """Work no more on episodes that are over, as soon as half of them are."""
+        self._awake = ~done[self._rows]
+        if 2 * int(self._awake.sum()) > len(self._rows):
+            return
+        kept = self._awake.nonzero()[:, 0]
+        self._rows, self._h, self._c = self._rows[kept], self._h[kept], self._c[kept]
+        if self._actions is not None:
+            self._actions = self._actions[kept]
+        if self._map is not None:
+            self._map.keep(kept)
+        if self._walked is not None:
+            self._walked = self._walked.keep(kept)
+
     def act(self, observation: TensorDict) -> Tensor:
         """One action for every episode."""
+        # drawn for all, so that what an episode draws does not depend on who is still there
+        race = torch.empty(self.n, self._trained().shape.actions)
+        race.exponential_(generator=self.generator)
+        actions = torch.zeros(self.n, dtype=torch.int64)
+        if len(self._rows):
+            everyone = len(self._rows) == self.n
+            own = observation if everyone else observation[self._rows]
+            actions[self._rows] = self._actions = self._chosen(own, race[self._rows])
+        return actions
+
+    @torch.no_grad()
+    def _chosen(self, observation: TensorDict, race: Tensor) -> Tensor:
+        """Actions of the episodes that are worked on."""
         network = self._trained()
         seen = {name: observation[name] for name in network.shape.features}
         if self._map is not None:
@@ -126,8 +154,7 @@ class ActorCriticAgent(Agent):
             seen["map"] = torch.stack(channels, dim=1)
         joint, self._h, self._c = network.remember(network.embed(seen), self._h, self._c)
         logits = network.actor(joint)
-        self._actions = sample(logits, self.generator) if self.samples else logits.argmax(dim=-1)
-        return self._actions
+        return first_of(logits, race) if self.samples else logits.argmax(dim=-1)
 
     def _trained(self) -> ActorCritic:
         if self.network is None:
@@ -143,6 +170,11 @@ class OccupancyWalk:
     log_odds: Tensor
     walk: Tensor
     squares: Tensor
+
+    def keep(self, rows: Tensor) -> OccupancyWalk:
+        """The same for some of the agents, by number."""
+        self.memory.walk = self.memory.walk[rows]
+        return replace(self, walk=self.walk[rows])
 
     def around(self, seen: dict[str, Tensor]) -> Tensor:
         """The map of each agent's walk around it, (N, width, width) float32."""

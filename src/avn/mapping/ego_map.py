@@ -53,6 +53,11 @@ class EgoMap:
         self.map.forget(chosen)
         self._last[chosen] = 0
 
+    def keep(self, rows: Tensor) -> None:
+        """Go on with some of the agents alone, by number."""
+        self.map.keep(rows)
+        self._last = self._last[rows]
+
     def observe(self, observation: TensorDict, actions: Tensor | None = None) -> Tensor:
         """Take in the newest observations, and give what is around each agent.
 

@@ -75,6 +75,12 @@ class OccupancyMap:
         """Make the maps of some agents, by number, as they were at first."""
         self.log_odds[rows], self.walls[rows], self._seen[rows] = 0.0, 0, False
 
+    def keep(self, rows: Tensor) -> None:
+        """Go on with the maps of some agents alone, by number."""
+        self.log_odds, self.walls, self._seen = (
+            own[rows] for own in (self.log_odds, self.walls, self._seen)
+        )
+
     def state_dict(self) -> dict[str, Tensor]:
         """All that is believed."""
         return {"log_odds": self.log_odds, "walls": self.walls, "seen": self._seen}

@@ -193,9 +193,18 @@ class ActorCritic(nn.Module):
 
 
 def sample(logits: Tensor, generator: torch.Generator | None = None) -> Tensor:
-    """Actions drawn with the softmax of (N, A) logits, (N,) int64.
+    """Actions drawn with the softmax of (N, A) logits, (N,) int64."""
+    return first_of(logits, torch.empty_like(logits).exponential_(generator=generator))
 
-    By exponential races: the first of independent arrivals at rates p is i with a chance of p_i.
+
+def first_of(logits: Tensor, race: Tensor) -> Tensor:
+    """The action that wins a race, (N,) int64.
+
+    Of independent arrivals at rates p the first is i with a chance of p_i.
+
+    Parameters
+    ----------
+    logits, race : (N, A) tensors
+        Of the softmax that is drawn from, and times of arrival at a rate of 1.
     """
-    race = torch.empty_like(logits).exponential_(generator=generator)
     return (torch.softmax(logits, dim=-1) / race).argmax(dim=-1)

@@ -1,0 +1,103 @@
+"""Actor-critic agents with untrained networks: what they are shown, and that rows stay apart."""
+
+import numpy as np
+import pytest
+import torch
+
+from avn.agents.actor_critic import ActorCriticAgent
+from avn.errors import UserError
+from avn.navigation.episodes import frozen_episodes
+from avn.navigation.place import draw
+from avn.navigation.protocols import Protocol
+from avn.navigation.run import Labels, walk, walk_room
+from avn.navigation.simulator import Simulator
+from avn.rl.networks import ActorCritic, Shape
+
+FLAT = """
+aaaaaaaaaa
+a.aaa.aaAa
+aaaaaaaaaa
+aaa.bbbbbb
+Aaa.bbbBbb
+"""
+RULES = Protocol("var", "box", False, "attempted", moves_factor=2.0, starts=6, exploration=30)
+
+
+def make_agent(memory=0, maps=False, hears=True, **options) -> ActorCriticAgent:
+    features = {"feature": 8} | ({"sound_feature": 6} if hears else {})
+    torch.manual_seed(0)
+    shape = Shape(features, 4, 16, memory, maps * (2 if memory else 1), map_width=11)
+    network = ActorCritic(shape)
+    with torch.no_grad():
+        network.actor.weight.mul_(300)  # far from uniform, so that what it sees counts
+    given = {"memory": memory, "map_width": 11, "hears": hears, "maps": maps, "map_size": 41}
+    return ActorCriticAgent(network, **(given | options))
+
+
+def senses(place):
+    generator = torch.Generator().manual_seed(0)
+    states, sources = 4 * len(place.grid.lattice), len(place.sources)
+    feature = torch.nn.functional.normalize(torch.randn(states, 8, generator=generator), dim=1)
+    window = torch.rand(states, 5, 5, generator=generator)
+    heard = torch.randn(sources, states, 2, 3, 6, generator=generator)
+    return {"sound_feature": heard}, {"feature": feature, "window": window}
+
+
+def records(agent, sounds=("one", "two"), rows=None):
+    place = draw("flat", FLAT)
+    episodes = frozen_episodes(place, sounds, RULES, seed=0)
+    return walk_room(agent, place, episodes, RULES, Labels("a3c", "resonance"), *senses(place))
+
+
+@pytest.mark.parametrize("memory", [0, 5])
+@pytest.mark.parametrize("maps", [False, True])
+def test_what_it_does_does_not_depend_on_which_episodes_are_over(memory, maps, monkeypatch):
+    agent = make_agent(memory, maps)
+    short = records(agent)
+    monkeypatch.setattr(ActorCriticAgent, "rest", lambda self, done: None)
+    whole = records(agent)
+    assert short.equals(whole)
+    assert short["actions"].nunique() > 3  # episodes did end at different times
+
+
+def test_the_same_seed_walks_the_same_way_and_the_likeliest_action_is_no_draw():
+    assert records(make_agent(5, True)).equals(records(make_agent(5, True)))
+    sure = make_agent(samples=False)
+    first = records(sure)
+    assert not first.equals(records(make_agent()))
+
+
+def test_it_wants_what_its_network_takes():
+    assert make_agent(hears=False).wants(RULES) == ("feature",)
+    assert make_agent(maps=True).wants(RULES) == ("feature", "sound_feature", "window")
+    assert make_agent(memory=4).explores
+    assert not make_agent().explores
+
+
+def test_an_agent_with_memory_begins_with_what_its_walk_left_it():
+    place = draw("flat", FLAT)
+    hearing, sights = senses(place)
+    episodes = frozen_episodes(place, ("one", "two"), RULES, seed=0)
+    agent = make_agent(memory=5)
+    begun = []
+
+    class Watching(ActorCriticAgent):
+        def act(self, observation):
+            if not begun:
+                begun.append(self._h.clone())
+            return super().act(observation)
+
+    agent.__class__ = Watching
+    walk(agent, Simulator(place, episodes, RULES, hearing, sights))
+    h, c = agent.network.no_memory(1)
+    with torch.no_grad():
+        for state in episodes.walks[0]:
+            seen = {"feature": sights["feature"][int(state)][None]}
+            _, h, c = agent.network.remember(agent.network.embed(seen), h, c)
+    assert torch.allclose(begun[0], h.expand_as(begun[0]), atol=1e-5)
+    assert np.all(episodes.walk == 0)
+
+
+def test_without_a_network_it_cannot_act():
+    with pytest.raises(UserError, match="no trained network"):
+        records(ActorCriticAgent())
