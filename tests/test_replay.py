@@ -86,6 +86,15 @@ def test_records_of_another_making_are_refused(command, outputs):
         path.write_bytes(whole)
 
 
+def test_a_run_of_another_version_sets_off_no_training(command, outputs, monkeypatch):
+    folder = made(command, outputs, "greedy")
+    monkeypatch.setitem(listening.VERSIONS, "sound_cnn", 99)
+    before = set((outputs / "train").iterdir())
+    with pytest.raises(UserError, match=r"of another version of avn .* is missing and auto=false"):
+        replay.traces(replay.open_run(folder), [0])
+    assert set((outputs / "train").iterdir()) == before
+
+
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(UserError, match=r"no run's folder, it has no config.yaml"):
         replay.open_run(tmp_path)

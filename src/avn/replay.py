@@ -21,10 +21,12 @@ from avn import config, evaluation, pipeline, senses
 from avn.cli import conf_folder
 from avn.dataset.scene import Scene
 from avn.errors import UserError
+from avn.navigation.run import Watch
 from avn.navigation.trace import Recorder, Trace
 
 # Settings that a run is named by where it differs in them from the others.
 _TELLING = ("protocol", "acoustics", "look", "localisation", "exploration", "seed", "train_seed")
+_OTHER = "the run is of another version of avn or of its networks: run avn.eval again"
 SHOWS = ("typical", "success", "failure")
 
 
@@ -68,8 +70,8 @@ def open_run(folder: Path) -> Run:
     table, episodes = evaluation.read(folder)
     try:
         cfg = _typed(OmegaConf.load(path))
-        # wherever the outputs have been moved to since
-        cfg.outputs = str(path.parents[4])
+        if len(path.parents) > 4 and path.parents[3].name == "eval":
+            cfg.outputs = str(path.parents[4])  # wherever the outputs have been moved to since
     except (OmegaConfBaseException, OSError, ValueError, KeyError, IndexError) as error:
         line = " ".join(str(error).split())
         raise UserError(f"{path}: not a config of this avn ({line}); run avn.eval again") from error
@@ -218,9 +220,6 @@ def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[l
     """As `traces`, of several choices in one walk."""
     asked = list(wanted)
     names = set(run.episodes.loc[[label for labels, _ in asked for label in labels], "room"])
-    observed = evaluation.wanted_by(run.cfg)
-    hearing = senses.heard(run.cfg, run.rooms, observed)
-    sights = senses.seen(run.cfg, run.rooms, observed)
     kept = [index for index, room in enumerate(run.rooms) if room.name in names]
     # in a batch the episodes of a room stand in the order of its records
     rows = run.episodes.groupby("room").cumcount()
@@ -232,13 +231,16 @@ def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[l
         enough = [recorder(*step) for recorder in recorders]  # each of them sees every step
         return all(enough)
 
-    walked = evaluation.walk_rooms(
-        run.cfg,
-        [run.rooms[i] for i in kept],
-        [hearing[i] for i in kept],
-        [sights[i] for i in kept],
-        watch,
-    )
+    # a run of another version must not set off the training of this version's networks
+    cfg = run.cfg.copy()
+    own = run.folder.resolve().name.endswith(evaluation.run_hash(cfg)[:8])
+    cfg.auto = cfg.auto and own
+    try:
+        walked = _walk(cfg, run.rooms, kept, watch)
+    except UserError as error:
+        if own:
+            raise
+        raise UserError(f"{run.folder}: {_OTHER} ({error})") from error
     _check_same(
         run, pd.concat(walked, ignore_index=True), [own for part, _ in asked for own in part]
     )
@@ -249,6 +251,21 @@ def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[l
         ]
         for recorder, (labels, _) in zip(recorders, asked, strict=True)
     ]
+
+
+def _walk(
+    cfg: DictConfig, rooms: Sequence[Scene], kept: Sequence[int], watch: Watch
+) -> list[pd.DataFrame]:
+    """Walk some of the rooms of a config, by number."""
+    observed = evaluation.wanted_by(cfg)
+    hearing, sights = senses.heard(cfg, rooms, observed), senses.seen(cfg, rooms, observed)
+    return evaluation.walk_rooms(
+        cfg,
+        [rooms[i] for i in kept],
+        [hearing[i] for i in kept],
+        [sights[i] for i in kept],
+        watch,
+    )
 
 
 def _by_room(run: Run, rows: pd.Series, labels: Sequence[int]) -> dict[str, list[int]]:
@@ -272,6 +289,6 @@ def _check_same(run: Run, walked: pd.DataFrame, labels: Sequence[int]) -> None:
         )
     except AssertionError as error:
         raise UserError(
-            f"{run.folder}: walked again, its episodes end otherwise than episodes.csv says; the "
-            "run is of another version of avn or of its networks: run avn.eval again"
+            f"{run.folder}: walked again, its episodes end otherwise than episodes.csv says: "
+            + _OTHER
         ) from error
