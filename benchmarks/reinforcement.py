@@ -52,7 +52,14 @@ cccccccccccdddddd
 cc##ccccC#ddddddd
 """
 WIDTH, N, STEPS = 128, 64, 20
-RECIPE = {"entropy": 0.01, "episodes": N, "steps": STEPS, "lr": 7e-4, "eps": 1e-5, "schedule": "constant"}
+RECIPE = {
+    "entropy": 0.01,
+    "episodes": N,
+    "steps": STEPS,
+    "lr": 7e-4,
+    "eps": 1e-5,
+    "schedule": "constant",
+}
 ROWS = {
     "a3c_v": ("feature",),
     "a3c_va": ("feature", "sound_feature"),
