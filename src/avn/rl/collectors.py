@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import torch
@@ -98,8 +99,9 @@ def _laid_out(steps: list[dict[str, Tensor]]) -> TensorDict:
     return TensorDict(found | {"index": TensorDict(numbers, shape)}, shape)
 
 
+# TorchRL keeps a last axis of 1 for these.
 _FLAGS = ("is_init", "reward", "terminated", "truncated", "done")
-COLLECTORS: dict[str, type[TorchrlCollector] | type[LeanCollector]] = {
+COLLECTORS: dict[str, Callable[[WalkEnv, Policy, int], Batches]] = {
     "torchrl": TorchrlCollector,
     "lean": LeanCollector,
 }
