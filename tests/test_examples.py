@@ -45,7 +45,7 @@ def test_a_sound_model_of_ones_own_is_trained(command, outputs):
 def test_a_sound_of_ones_own_is_heard(command, outputs, tmp_path, monkeypatch, sound):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(EXAMPLES / "beep.py"))
-    where = () if sound == "beep.wav" else ("--config-dir", str(tmp_path / "conf"))
+    where = () if sound == "beep.wav" else ("--config-dir", str(tmp_path / "my_conf"))
     options = ("agent=greedy", f"sound={sound}", *SMALL, f"outputs={outputs}")
     code, out, err = command("eval", *where, *options)
     assert code == 0, err
