@@ -12,7 +12,7 @@ from hydra import compose
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
-from avn import evaluation, listening, pipeline, reinforcement
+from avn import evaluation, listening, pipeline, reinforcement, sound_features
 from avn.cli import command
 from avn.errors import UserError
 from avn.reporting import published, results, table
@@ -40,6 +40,7 @@ def main(cfg: DictConfig) -> Path:
     parts = [part for part, found in pipeline.plans(cfg).items() if found]
     pipeline.scenes(cfg, parts, audible=True, asked=True)
     configs = [own for row in cfg.rows for own in _runs(cfg, row)]
+    _listen_once(configs)
     folders = []
     for number, own in enumerate(configs):
         folders.append(evaluation.evaluate(own))
@@ -54,6 +55,18 @@ def main(cfg: DictConfig) -> Path:
     _write(target, runs, walked, list(listening.sound_files(configs[0])))
     tell(str(target))
     return target
+
+
+def _listen_once(configs: Sequence[DictConfig]) -> None:
+    """Make the features of what is heard before any row asks for estimates alone.
+
+    The estimates come with the features, so that every clip is listened to once.
+    """
+    for own in configs:
+        missing = not evaluation.finished(own)
+        if missing and "sound_feature" in evaluation.wanted_by(own) and listening.hears(own):
+            rooms = pipeline.scenes(own, (own.part,), audible=True)[own.part]
+            sound_features.sound_features(own, rooms, sound_features.evaluated_clips(own))
 
 
 def _runs(cfg: DictConfig, row: str) -> list[DictConfig]:
