@@ -1,10 +1,13 @@
 """`python -m avn.figures` on runs of the mini split."""
 
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 from small import EYES, SMALL
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensorboard.backend.event_processing.plugin_event_multiplexer import EventMultiplexer
+from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData
 
 from avn import figures
 
@@ -39,6 +42,44 @@ def test_pictures_lie_in_the_run_and_in_tensorboard(command, outputs, capfd):
 
 def pictures(folder: str) -> list[Path]:
     return sorted((Path(folder) / "figures").glob("*.png"))
+
+
+def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(command, outputs):
+    ours, greedy = (made(command, outputs, agent) for agent in ("ours_noexp", "greedy"))
+    assert figures.main([ours, greedy, "--count", "1"]) == 0
+    found = EventMultiplexer().AddRunsFromDirectory(str(outputs)).Reload()
+    for folder, agent in ((ours, "ours_noexp"), (greedy, "greedy")):
+        run = str(Path(folder).relative_to(outputs))
+        settings, metrics = hparams(found, run)
+        assert settings["agent"].string_value == agent
+        assert settings["seed"].number_value == 0
+        assert metrics == {"sr", "spl"}
+        assert metrics <= set(found.Runs()[run]["scalars"])
+        assert "spl/all/average" in found.Runs()[run]["scalars"]
+    assert any(tag.startswith("figures/") for tag in found.Runs()[run]["images"])
+    trained = {name: tags for name, tags in found.Runs().items() if name.startswith("train/")}
+    heard = {name: tags for name, tags in trained.items() if name.startswith("train/sound_cnn-")}
+    assert heard
+    for tags in heard.values():
+        assert {"loss/steps", "error_m/validation/all/all"} <= set(tags["scalars"])
+        assert "audio/alarm/in_sight" in tags["audio"]
+        assert "locations/alarm" in tags["images"]
+    seen = [tags for name, tags in trained.items() if name.startswith("train/occupancy_cnn-")]
+    assert seen
+    assert all("windows" in tags["images"] and "loss/steps" in tags["scalars"] for tags in seen)
+
+
+def hparams(found: EventMultiplexer, run: str) -> tuple[dict[str, Any], set[str]]:
+    """The settings of a run, and the names of the figures that it is compared by."""
+
+    def read(tag: str) -> HParamsPluginData:
+        data = found.SummaryMetadata(run, f"_hparams_/{tag}").plugin_data
+        assert data.plugin_name == "hparams"
+        return HParamsPluginData.FromString(data.content)
+
+    compared = read("experiment").experiment.metric_infos
+    settings = read("session_start_info").session_start_info.hparams
+    return dict(settings), {info.name.tag for info in compared}
 
 
 def test_mistakes_are_one_line(command, outputs, capfd, tmp_path):

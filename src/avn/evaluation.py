@@ -95,11 +95,17 @@ def evaluate(cfg: DictConfig) -> Path:
     folder = run_folder(cfg)
     make_once(
         folder,
-        f"run of '{cfg.agent.name}' with seed {cfg.seed}",
+        f"run of '{cfg.agent.name}' (seed {cfg.seed}, train_seed {cfg.train_seed})",
         done=(folder / RESULTS).is_file,
         make=lambda: _walk(cfg, folder),
+        seconds=_walking_time(cfg),
     )
     return folder
+
+
+def _walking_time(cfg: DictConfig) -> float:
+    """Seconds that a run takes on two cores, roughly, once all that it needs is there."""
+    return 30.0 if cfg.planner._target_ else 10.0
 
 
 def _walk(cfg: DictConfig, folder: Path) -> None:

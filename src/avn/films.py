@@ -54,7 +54,7 @@ def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
             f"{'film' if len(missing) == 1 else f'{len(missing)} films'} of '{cfg.agent.name}'",
             done=lambda: all(path.is_file() for path in paths.values()),
             make=lambda: _write(run, {label: paths[label] for label in missing}),
-            estimate=f"about {max(1, len(missing) * 15)} s",
+            seconds=len(missing) * 15,
         )
     for path in paths.values():
         tell(str(path))

@@ -35,6 +35,7 @@ def trained(
     data: Callable[[], L.LightningDataModule],
     measure: Callable[[Trained, Any], dict[str, Any]] | None = None,
     asked: bool = False,
+    seconds: float = 240.0,
 ) -> Trained:
     """Give a network its weights; train it where they are missing.
 
@@ -52,6 +53,8 @@ def trained(
         Measures the trained network on the data; what it gives is added to the metrics.
     asked : bool
         Whether it is the network that the user asked for, so that `auto=false` does not refuse it.
+    seconds : float
+        How long it takes on two cores, roughly.
 
     Raises
     ------
@@ -74,7 +77,7 @@ def trained(
         done=(folder / METRICS).is_file,
         make=fit,
         auto=cfg.auto or asked,
-        estimate="a few minutes",
+        seconds=seconds,
     )
     best = folder / training.BEST
     training.load_weights(model, best)
@@ -115,8 +118,10 @@ class Outcome:
         Of the files.
     made_from : str
         Hash of everything that it depends on beside the apartment.
-    title, estimate : str
-        What it is and how long it takes, for the line that says that it is missing.
+    title : str
+        What it is, for the line that says that it is missing.
+    seconds : float
+        How long it takes on two cores, roughly.
     """
 
     stage: str
@@ -126,7 +131,7 @@ class Outcome:
     version: int
     made_from: str
     title: str
-    estimate: str
+    seconds: float
 
     def of(
         self,
@@ -166,7 +171,7 @@ class Outcome:
             done=lambda: all(path.is_file() for path in paths),
             make=make_missing,
             auto=cfg.auto,
-            estimate=self.estimate,
+            seconds=self.seconds,
         )
         return [self._read(path, own) for path, own in zip(paths, hashes, strict=True)]
 

@@ -6,7 +6,8 @@ which says whether it is within reach.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,8 @@ TRAINING_SOUNDS = {name: name for name in BUILTIN}
 # Draws the takes of what is heard; an episode draws among them from its own seed.
 HEARING_SEED = 0
 MOST_TAKES = 1000
+# How fast two cores listen, roughly, to say how long it takes.
+CLIPS_PER_SECOND = 800
 
 
 def hears(cfg: DictConfig) -> bool:
@@ -51,6 +54,17 @@ def hears(cfg: DictConfig) -> bool:
 def can_stop(cfg: DictConfig) -> bool:
     """Whether the config has a stop classifier."""
     return bool(cfg.stop_model.name != "none")
+
+
+def check_hears(cfg: DictConfig) -> None:
+    """Raise `UserError` where the config has no sound model."""
+    if not hears(cfg):
+        raise UserError("sound_model: 'none' cannot hear; choose cnn5 or released")
+
+
+def _check_stops(cfg: DictConfig) -> None:
+    if not can_stop(cfg):
+        raise UserError("stop_model: 'none' cannot say Stop; choose cnn5")
 
 
 def sound_files(cfg: DictConfig) -> dict[str, str]:
@@ -105,12 +119,12 @@ def sound_model(cfg: DictConfig, asked: bool = False) -> tuple[SoundCnn, Path]:
     UserError
         Where the config has no sound model, or a checkpoint belongs to another config.
     """
-    if not hears(cfg):
-        raise UserError("sound_model: 'none' cannot hear; choose cnn5 or released")
+    check_hears(cfg)
     torch.manual_seed(cfg.sound_model.train_seed)
     model: SoundCnn = instantiate(cfg.sound_model)
     folder = stage_folder(cfg.outputs, "train", "sound_cnn", model_hash(cfg))
-    title = f"sound network '{cfg.sound_model.name}' ({cfg.acoustics.name})"
+    seed = f"train_seed {cfg.sound_model.train_seed}"
+    title = f"sound network '{cfg.sound_model.name}' ({cfg.acoustics.name}, {seed})"
 
     def data() -> SoundData:
         return SoundData(**_training_set(cfg), recipe=pipeline.typed(cfg.sound_model))
@@ -123,12 +137,12 @@ def stop_model(cfg: DictConfig, asked: bool = False) -> tuple[StopClassifier, Pa
 
     The goal that it knows is that of the protocol: its 3 x 3 cells, or its radius.
     """
-    if not can_stop(cfg):
-        raise UserError("stop_model: 'none' cannot say Stop; choose cnn5")
+    _check_stops(cfg)
     protocol: Protocol = instantiate(cfg.protocol)
     model: StopClassifier = instantiate(cfg.stop_model)
     folder = stage_folder(cfg.outputs, "train", "stop_classifier", stop_model_hash(cfg))
-    title = f"stop classifier '{cfg.stop_model.name}' ({cfg.acoustics.name}, {protocol.goal})"
+    settings = f"{cfg.acoustics.name}, {protocol.goal}, train_seed {cfg.stop_model.train_seed}"
+    title = f"stop classifier '{cfg.stop_model.name}' ({settings})"
 
     def data() -> StopData:
         return StopData(
@@ -212,8 +226,8 @@ def hearing(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
     list of (K, S, sounds, takes, 2) float32
         Metres to the right and to the front.
     """
-    model, _ = sound_model(cfg)
-    return _listen(cfg, chosen, model, hearing_outcome(cfg, chosen))
+    check_hears(cfg)
+    return _listen(cfg, chosen, lambda: sound_model(cfg)[0], hearing_outcome(cfg, chosen))
 
 
 def hearing_outcome(cfg: DictConfig, chosen: Sequence[Scene]) -> Outcome:
@@ -226,7 +240,7 @@ def hearing_outcome(cfg: DictConfig, chosen: Sequence[Scene]) -> Outcome:
         version=VERSIONS["hear"],
         made_from=hear_hash(cfg),
         title=f"what '{cfg.sound_model.name}' hears",
-        estimate=_listening_time(cfg, chosen),
+        seconds=_listening_time(cfg, chosen),
     )
 
 
@@ -240,7 +254,7 @@ def stop_scores(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
     list of (K, S, sounds, takes) float32
         Probability that the source is within reach.
     """
-    model, _ = stop_model(cfg)
+    _check_stops(cfg)
     outcome = Outcome(
         stage="stop",
         what="-".join(sound_files(cfg)),
@@ -249,27 +263,28 @@ def stop_scores(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
         version=VERSIONS["stop"],
         made_from=stop_hash(cfg),
         title=f"where stop classifier '{cfg.stop_model.name}' would stop",
-        estimate=_listening_time(cfg, chosen),
+        seconds=_listening_time(cfg, chosen),
     )
-    return _listen(cfg, chosen, model, outcome)
+    return _listen(cfg, chosen, lambda: stop_model(cfg)[0], outcome)
 
 
-def _listening_time(cfg: DictConfig, chosen: Sequence[Scene]) -> str:
+def _listening_time(cfg: DictConfig, chosen: Sequence[Scene]) -> float:
     clips = sum(4 * s.grid.cells * len(s.sources) for s in chosen) * len(cfg.sound) * cfg.takes
-    return f"about {max(1, clips // 800)} s"
+    return clips / CLIPS_PER_SECOND
 
 
 def _listen(
-    cfg: DictConfig, chosen: Sequence[Scene], model: Listener, outcome: Outcome
+    cfg: DictConfig, chosen: Sequence[Scene], open_model: Callable[[], Listener], outcome: Outcome
 ) -> list[Tensor]:
     acoustics = pipeline.acoustics_of(cfg)
+    model = cache(open_model)
 
     def listen(scene: Scene) -> Tensor:
         return hear(
             scene,
             acoustics.name,
             DrySounds(load_sounds(sound_files(cfg))),
-            model,
+            model(),
             cfg.takes,
             pipeline.typed(cfg.microphone),
             seed=HEARING_SEED,

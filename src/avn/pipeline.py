@@ -104,7 +104,7 @@ def scenes(
             done=lambda: build.acoustics_made(every, acoustics),
             make=lambda: build.build_acoustics(every, acoustics, cfg.processes),
             auto=auto,
-            estimate=f"about {max(1, round(pairs * 0.02 / cfg.processes))} s",
+            seconds=pairs * 0.02 / cfg.processes,
         )
     return opened
 
@@ -132,6 +132,6 @@ def seen_scenes(
         done=lambda: views_made(every, renderer),
         make=lambda: build_views(every, renderer, cfg.processes),
         auto=cfg.auto or asked,
-        estimate=f"about {max(1, round((count * 0.06 + 60 * len(every)) / cfg.processes))} s",
+        seconds=(count * 0.06 + 60 * len(every)) / cfg.processes,
     )
     return opened

@@ -18,28 +18,49 @@ from rich.progress import (
 )
 from rich.text import Text
 
+# Where bars are drawn while a dashboard stands on the screen.
+_shared: list[Progress] = []
+
 
 class _Rate(ProgressColumn):
-    def __init__(self, unit: str) -> None:
-        super().__init__()
-        self.unit = unit
-
     def render(self, task: Task) -> Text:
         speed = task.finished_speed or task.speed
-        return Text(f"{speed:.0f} {self.unit}/s" if speed else "")
+        return Text(f"{speed:.0f} {task.fields['unit']}/s" if speed else "")
+
+
+def progress_columns(console: Console) -> Progress:
+    """Bars with a rate and the time left, not yet shown."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        _Rate(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    return Progress(*columns, console=console, speed_estimate_period=60)
+
+
+@contextmanager
+def bars_in(progress: Progress) -> Iterator[None]:
+    """Draw the bars of the block among those of a dashboard, each as long as its work lasts."""
+    _shared.append(progress)
+    try:
+        yield
+    finally:
+        _shared.pop()
 
 
 @contextmanager
 def progress_bar(what: str, total: int, unit: str) -> Iterator[Callable[[int], None]]:
     """Show a bar on the error stream; the block calls what it gets with each count done."""
-    console = Console(file=sys.stderr)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        _Rate(unit),
-        TimeRemainingColumn(elapsed_when_finished=True),
-    )
-    with Progress(*columns, console=console, speed_estimate_period=60) as progress:
-        task = progress.add_task(what, total=total)
+    if _shared:
+        progress = _shared[-1]
+        task = progress.add_task(what, total=total, unit=unit)
+        try:
+            yield lambda count: progress.advance(task, count)
+        finally:
+            progress.remove_task(task)
+        return
+    with progress_columns(Console(file=sys.stderr)) as progress:
+        task = progress.add_task(what, total=total, unit=unit)
         yield lambda count: progress.advance(task, count)

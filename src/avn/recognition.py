@@ -38,7 +38,7 @@ def features(cfg: DictConfig, parts: Sequence[str]) -> dict[str, list[Tensor]]:
         something is missing and `auto` is false.
     """
     check_name("backbone.name", cfg.backbone.name)
-    opened, hashes = pipeline.seen_scenes(cfg, parts), pipeline.views_hashes(cfg, parts)
+    opened, hashes = pipeline.scenes(cfg, parts), pipeline.views_hashes(cfg, parts)
     name = cfg.backbone.name
     if cfg.renderer.name != "raycast":  # two renderers' features lie beside each other
         name += f"-{cfg.renderer.name}"
@@ -52,6 +52,7 @@ def features(cfg: DictConfig, parts: Sequence[str]) -> dict[str, list[Tensor]]:
         return [e for e in every if not is_there(features_file(e[0].folder, name), e[2])]
 
     def make() -> None:
+        pipeline.seen_scenes(cfg, parts)
         backbone = backbone_class(pipeline.typed(cfg.backbone))(pipeline.typed(cfg.backbone))
         for which, views, own in missing():
             seen = which.views(cfg.renderer.name, views)
@@ -66,7 +67,7 @@ def features(cfg: DictConfig, parts: Sequence[str]) -> dict[str, list[Tensor]]:
         done=lambda: not missing(),
         make=make,
         auto=cfg.auto,
-        estimate=f"about {max(1, states // 100)} s",
+        seconds=states / 100,
     )
     return {
         part: [

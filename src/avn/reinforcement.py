@@ -58,7 +58,7 @@ def policy_hash(cfg: DictConfig) -> str:
         acoustics = pipeline.acoustics_of(cfg)
         plans = pipeline.plans(cfg)
         observed += [build.first_arrival_hash(plan, acoustics) for p in PARTS for plan in plans[p]]
-        observed += [sound_features.features_hash(cfg, _clips(cfg, part)) for part in PARTS]
+        observed += [sound_features.features_hash(cfg, clips_of(cfg, part)) for part in PARTS]
     if seeing.sees_windows(cfg):
         observed += [seeing.see_hash(cfg), cfg.mapper.visible_above, cfg.mapper.size]
     node: Any = OmegaConf.to_container(cfg.baseline, resolve=True)
@@ -88,17 +88,28 @@ def policy(cfg: DictConfig, asked: bool = False) -> tuple[ActorCritic, Path]:
     folder = stage_folder(cfg.outputs, "train", cfg.agent.name, made_from)
     make_once(
         folder,
-        f"agent '{cfg.agent.name}' ({cfg.acoustics.name}, {cfg.protocol.name})",
+        f"agent '{cfg.agent.name}' ({_settings(cfg)})",
         done=(folder / METRICS).is_file,
         make=lambda: _train(cfg, recipe, folder, made_from),
         auto=cfg.auto or asked,
-        estimate="about 15 min" if cfg.baseline.memory else "about 6 min",
+        seconds=_training_time(cfg),
     )
     network = ActorCritic(_shape(cfg, _feature_sizes(folder)))
     load_network(network, folder / BEST, made_from)
     if read_metrics(folder).get(CHECKSUM) != file_hash(folder / BEST):
         raise UserError(f"{folder / BEST}: changed since it was trained; delete {folder}")
     return network.eval(), folder
+
+
+def _settings(cfg: DictConfig) -> str:
+    """What tells networks of one row apart, in words."""
+    return f"{cfg.acoustics.name}, {cfg.protocol.name}, train_seed {cfg.a3c.train_seed}"
+
+
+def _training_time(cfg: DictConfig) -> float:
+    """Seconds that training takes on two cores, roughly."""
+    microseconds = 30 + 30 * seeing.sees_windows(cfg) + 30 * bool(cfg.baseline.memory)
+    return float(cfg.a3c.total * microseconds / 1e6 * 1.6)
 
 
 def parts(cfg: DictConfig, ready: bool) -> dict[str, Any]:
@@ -141,7 +152,7 @@ def free_world(
     return World(tables, starts, n, protocol, max_steps, recipe.reward, recipe.train_seed)
 
 
-def _clips(cfg: DictConfig, part: str) -> Clips:
+def clips_of(cfg: DictConfig, part: str) -> Clips:
     """What is heard in the apartments of a part: the built-in sounds, whatever `sound` says."""
     if part == "train":
         return Clips(listening.TRAINING_SOUNDS, cfg.a3c.takes, "train")
@@ -177,7 +188,7 @@ def _observed(cfg: DictConfig, part: str) -> tuple[list[Scene], list[Any], list[
     for own, found in zip(sights, recognition.features(cfg, (part,))[part], strict=True):
         own["feature"] = found
     if listening.hears(cfg):
-        heard = sound_features.sound_features(cfg, rooms, _clips(cfg, part))
+        heard = sound_features.sound_features(cfg, rooms, clips_of(cfg, part))
         for own, found in zip(hearing, heard, strict=True):
             own["sound_feature"] = found
     if seeing.sees_windows(cfg):
@@ -220,7 +231,7 @@ def _train(cfg: DictConfig, recipe: A3CConfig, folder: Path, made_from: str) -> 
     metrics |= {"seconds": time.perf_counter() - started, CHECKSUM: file_hash(folder / BEST)}
     with written_whole(folder / METRICS) as part:
         part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
-    title = f"Actor-critic agent '{cfg.agent.name}' ({cfg.acoustics.name}, {cfg.protocol.name})"
+    title = f"Actor-critic agent '{cfg.agent.name}' ({_settings(cfg)})"
     recipe_of = {"baseline": cfg.baseline, "a3c": cfg.a3c, "protocol": cfg.protocol}
     plain = {name: OmegaConf.to_container(node, resolve=True) for name, node in recipe_of.items()}
     write_card(folder, title, apartments(cfg), plain, metrics)

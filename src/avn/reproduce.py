@@ -12,11 +12,12 @@ from hydra import compose
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
-from avn import evaluation, listening, pipeline, reinforcement, sound_features
+from avn import evaluation, listening, preparation, reinforcement
 from avn.cli import command
 from avn.errors import UserError
 from avn.reporting import published, results, table
-from avn.stages import digest, spent, stage_folder, tell, written_whole
+from avn.reporting.dashboard import Dashboard
+from avn.stages import digest, span, spent, stage_folder, tell, written_whole
 
 # Overrides that belong to this command and not to a row.
 _OWN = ("rows", "seeds", "train_seeds", "sounds")
@@ -36,37 +37,57 @@ def main(cfg: DictConfig) -> Path:
     for key in ("rows", "seeds", "train_seeds"):
         if not cfg[key]:
             raise UserError(f"{key}: empty; give at least one, such as rows=greedy seeds=0")
-    started = time.perf_counter()
-    parts = [part for part, found in pipeline.plans(cfg).items() if found]
-    pipeline.scenes(cfg, parts, audible=True, asked=True)
     configs = [own for row in cfg.rows for own in _runs(cfg, row)]
-    _listen_once(configs)
-    folders = []
-    for number, own in enumerate(configs):
-        folders.append(evaluation.evaluate(own))
-        if number + 1 == len(configs) or configs[number + 1].agent.name != own.agent.name:
-            _tell_row(own.agent.name, folders, configs, time.perf_counter() - started)
+    folders = _walk(configs)
     tables, episodes = zip(*map(evaluation.read, folders), strict=True)
     runs, walked = pd.concat(tables), pd.concat(episodes)
     privileged = {own.agent.name for own in configs if own.agent.privileged}
-    table.print_tables(runs, episodes[0], privileged=privileged)
+    cells = published.published(runs, walked)
+    for shown in (published.terminal(cells, privileged), table.hardness_table(episodes[0])):
+        table.wide_console().print(shown)
     _compare(walked, [own.agent.name for own in configs])
     target = stage_folder(cfg.outputs, "reproduce", "table", digest([f.name for f in folders]))
-    _write(target, runs, walked, list(listening.sound_files(configs[0])))
+    _write(target, runs, cells, list(listening.sound_files(configs[0])))
     tell(str(target))
     return target
 
 
-def _listen_once(configs: Sequence[DictConfig]) -> None:
-    """Make the features of what is heard before any row asks for estimates alone.
+def _walk(configs: Sequence[DictConfig]) -> list[Path]:
+    """Make what is missing and let all runs walk; tell the plan before, and each row at its end."""
+    steps = preparation.steps(configs)
+    missing = [step.stage for step in steps if step.stage.missing]
+    for stage in missing:
+        tell(f"to make: {stage.what} (about {span(stage.seconds)})")
+    if missing:
+        tell(f"all in all about {span(sum(stage.seconds for stage in missing))}")
+    rows = list(dict.fromkeys(cfg.agent.name for cfg in configs))
+    left = [cfg.agent.name for cfg in configs]
+    started = time.monotonic()
+    walked: dict[str, list[Path]] = {row: [] for row in rows}
+    with Dashboard(missing, rows, published.paper_averages()) as board:
+        for step in steps:
+            if step.stage.missing:
+                step.make()
+                board.made()
+            if step.run is None:
+                continue
+            row = step.run.agent.name
+            walked[row].append(step.stage.folder)
+            left.remove(row)
+            board.fill(row, _average(walked[row]))
+            if row not in left:
+                passed = span(time.monotonic() - started)
+                tell(f"{row}: {_average(walked[row])} after {passed}")
+    return [folder for row in rows for folder in walked[row]]
 
-    The estimates come with the features, so that every clip is listened to once.
-    """
-    for own in configs:
-        missing = not evaluation.finished(own)
-        if missing and "sound_feature" in evaluation.wanted_by(own) and listening.hears(own):
-            rooms = pipeline.scenes(own, (own.part,), audible=True)[own.part]
-            sound_features.sound_features(own, rooms, sound_features.evaluated_clips(own))
+
+def _average(folders: Sequence[Path]) -> str:
+    """Success rate and SPL of some runs, over all sounds and rooms."""
+    runs = pd.concat([evaluation.read(folder)[0] for folder in folders])
+    average = runs[runs["room"] == results.AVERAGE]
+    every = average[average["sound"] == results.ALL_SOUNDS]
+    mean = 100.0 * (every if len(every) else average)[["sr", "spl"]].mean()
+    return f"{mean['sr']:.1f} / {mean['spl']:.1f}"
 
 
 def _runs(cfg: DictConfig, row: str) -> list[DictConfig]:
@@ -94,19 +115,8 @@ def _composed(overrides: list[str], sounds: Sequence[str]) -> DictConfig:
     return own
 
 
-def _tell_row(name: str, folders: list[Path], configs: list[DictConfig], seconds: float) -> None:
-    """Print the average of a row as soon as it has walked."""
-    own = [f for f, cfg in zip(folders, configs, strict=False) if cfg.agent.name == name]
-    runs = pd.concat([evaluation.read(folder)[0] for folder in own])
-    average = runs[runs["room"] == results.AVERAGE]
-    every = average[average["sound"] == results.ALL_SOUNDS]
-    mean = 100.0 * (every if len(every) else average)[["sr", "spl"]].mean()
-    tell(f"{name}: {mean['sr']:.1f} / {mean['spl']:.1f} after {seconds / 60:.1f} min")
-
-
-def _write(target: Path, runs: pd.DataFrame, walked: pd.DataFrame, sounds: list[str]) -> None:
+def _write(target: Path, runs: pd.DataFrame, cells: pd.DataFrame, sounds: list[str]) -> None:
     """Leave the table as CSV, Markdown and LaTeX, and where the time went."""
-    cells = published.published(runs, walked)
     results.write_csv(runs, target / evaluation.RESULTS)
     results.write_csv(results.across_seeds(runs), target / ACROSS)
     results.write_csv(cells, target / CELLS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,11 @@ def sees_windows(cfg: DictConfig) -> bool:
     return cfg.mapper.network is not None
 
 
+def _check_sees(cfg: DictConfig) -> None:
+    if not sees_windows(cfg):
+        raise UserError(f"mapper: '{cfg.mapper.name}' sees no free cells; choose occupancy")
+
+
 def model_hash(cfg: DictConfig) -> str:
     """Hash of what the occupancy network's weights depend on."""
     renderer, plans = pipeline.typed(cfg.renderer), pipeline.plans(cfg)
@@ -63,14 +68,14 @@ def occupancy_model(cfg: DictConfig, asked: bool = False) -> tuple[OccupancyCnn,
     UserError
         Where the config has no such network, or a checkpoint belongs to another config.
     """
-    if not sees_windows(cfg):
-        raise UserError(f"mapper: '{cfg.mapper.name}' sees no free cells; choose occupancy")
+    _check_sees(cfg)
     recipe = cfg.mapper.network
     camera: Any = OmegaConf.to_container(cfg.renderer.camera, resolve=True)
     torch.manual_seed(recipe.train_seed)
     model: OccupancyCnn = instantiate(recipe, camera=camera)
     folder = stage_folder(cfg.outputs, "train", "occupancy_cnn", model_hash(cfg))
-    title = f"occupancy network '{recipe.name}' ({cfg.renderer.name})"
+    settings = f"{cfg.renderer.name}, train_seed {recipe.train_seed}"
+    title = f"occupancy network '{recipe.name}' ({settings})"
     return trained(cfg, model, folder, title, lambda: _data(cfg), _measure, asked), folder
 
 
@@ -93,7 +98,7 @@ def _make_looks(cfg: DictConfig, scenes: Sequence[Scene], looks: Sequence[int]) 
         done=lambda: views_made(every, renderer, looks),
         make=lambda: build_views(every, renderer, cfg.processes, looks),
         auto=cfg.auto,
-        estimate=f"about {max(1, round(count * 0.06 / cfg.processes))} s",
+        seconds=count * 0.06 / cfg.processes,
     )
 
 
@@ -183,10 +188,9 @@ def see_hash(cfg: DictConfig) -> str:
 
 def _windows(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
     """Probabilities of free and of visible cells, (S, 2, 5, 5) for each apartment."""
-    model, _ = occupancy_model(cfg)
+    _check_sees(cfg)
     renderer = pipeline.typed(cfg.renderer)
     parts = [_part_of(cfg, scene) for scene in chosen]
-    pipeline.seen_scenes(cfg, sorted(set(parts)))
     hashes = [
         views_hash(scene.plan, part, renderer) for scene, part in zip(chosen, parts, strict=True)
     ]
@@ -200,11 +204,16 @@ def _windows(cfg: DictConfig, chosen: Sequence[Scene]) -> list[Tensor]:
         version=VERSIONS["see"],
         made_from=see_hash(cfg),
         title=f"what occupancy network '{cfg.mapper.network.name}' sees",
-        estimate=f"about {max(1, states // 100)} s",
+        seconds=states / 100,
     )
 
+    @cache
+    def network() -> OccupancyCnn:
+        pipeline.seen_scenes(cfg, sorted(set(parts)))
+        return occupancy_model(cfg)[0]
+
     def see(scene: Scene) -> Tensor:
-        return judge_views(model, scene, renderer.name, made_from[scene.name])
+        return judge_views(network(), scene, renderer.name, made_from[scene.name])
 
     return outcome.of(cfg, chosen, hashes, see)
 

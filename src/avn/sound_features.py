@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import torch
 from omegaconf import DictConfig
@@ -71,7 +72,8 @@ def sound_features(cfg: DictConfig, chosen: Sequence[Scene], clips: Clips) -> li
         Where the config has no sound model, a file is damaged, or it is missing and `auto` is
         false.
     """
-    model, _ = listening.sound_model(cfg)
+    listening.check_hears(cfg)
+    network = cache(lambda: listening.sound_model(cfg)[0])
     acoustics = pipeline.acoustics_of(cfg)
     pairs = sum(4 * s.grid.cells * len(s.sources) for s in chosen)
     count = pairs * len(clips.sounds) * clips.takes
@@ -83,10 +85,11 @@ def sound_features(cfg: DictConfig, chosen: Sequence[Scene], clips: Clips) -> li
         version=VERSION,
         made_from=features_hash(cfg, clips),
         title=f"sound features by '{cfg.sound_model.name}'",
-        estimate=f"about {max(1, count // 800)} s",
+        seconds=count / listening.CLIPS_PER_SECOND,
     )
 
     def listen(scene: Scene) -> Tensor:
+        model = network()
         found = hear(
             scene,
             acoustics.name,

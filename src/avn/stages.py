@@ -14,6 +14,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -65,13 +66,57 @@ def check_name(option: str, name: str) -> None:
         raise UserError(f"{option}: '{name}' cannot name a folder; use letters, digits, - and _")
 
 
+@dataclass(frozen=True)
+class Stage:
+    """What would be made.
+
+    Attributes
+    ----------
+    what : str
+        What it is.
+    folder : Path
+        Where it lies, or will.
+    seconds : float
+        How long it takes on two cores, roughly; without what it needs and is missing too.
+    missing : bool
+    """
+
+    what: str
+    folder: Path
+    seconds: float
+    missing: bool
+
+
+class _AskedError(Exception):
+    """Ends a call that only asks what it would make."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+
+
+_only_asking = False
+
+
+def ask(make: Callable[[], object]) -> Stage:
+    """The first stage that a call would make or find, which it neither makes nor opens."""
+    global _only_asking
+    _only_asking = True
+    try:
+        make()
+    except _AskedError as asked:
+        return asked.stage
+    finally:
+        _only_asking = False
+    raise ValueError("nothing is made on this call")
+
+
 def make_once(
     folder: Path,
     what: str,
     done: Callable[[], bool],
     make: Callable[[], None],
     auto: bool = True,
-    estimate: str = "",
+    seconds: float = 0.0,
 ) -> None:
     """Make what is missing in `folder`, unless it is there or another process makes it.
 
@@ -85,14 +130,16 @@ def make_once(
         Whether it is there, and what makes it; `make` goes on where a killed one stopped.
     auto : bool
         With False a missing result is refused instead.
-    estimate : str
-        How long it takes, for the line that says so.
+    seconds : float
+        How long it takes on two cores, for the line that says so.
 
     Raises
     ------
     UserError
         Where it is missing and `auto` is False.
     """
+    if _only_asking:
+        raise _AskedError(Stage(what, folder, seconds, not done()))
     if done():
         return
     if not auto:
@@ -100,18 +147,23 @@ def make_once(
     with locked(folder, what):
         if done():
             return
-        tell(f"{what} is missing: making it" + (f" ({estimate})" if estimate else ""))
+        tell(f"{what} is missing: making it" + (f" (about {span(seconds)})" if seconds else ""))
         started = time.perf_counter()
         _within.append(0.0)
         try:
             make()
         finally:
             inner = _within.pop()
-        seconds = time.perf_counter() - started
-        spent[what] = spent.get(what, 0.0) + seconds - inner
+        took = time.perf_counter() - started
+        spent[what] = spent.get(what, 0.0) + took - inner
         if _within:
-            _within[-1] += seconds
-        tell(f"{what} made in {seconds:.0f} s: {folder}")
+            _within[-1] += took
+        tell(f"{what} made in {span(took)}: {folder}")
+
+
+def span(seconds: float) -> str:
+    """A length of time in words, such as `40 s` or `2.5 min`."""
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.1f} min"
 
 
 @contextmanager

@@ -1,8 +1,11 @@
+import io
+
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 
-from avn.reporting.published import latex, markdown, published
+from avn.reporting.published import latex, markdown, published, terminal
 from avn.reporting.results import EPISODE_COLUMNS, summarise
 from avn.reporting.table import paper_table
 
@@ -49,14 +52,38 @@ def test_the_average_is_that_of_the_rooms(table):
     assert ring["average"] == pytest.approx(ring[["room_1", "room_2"]].mean())
 
 
-def test_markdown_has_a_line_for_each_agent_and_an_interval_in_the_average(table):
+def test_a_cell_has_its_interval_its_spread_and_the_papers_own(table):
     cells, _ = table
+    one = cells[(cells["room"] == "room_1") & (cells["sound"] == "ring")].iloc[0]
+    lines = [
+        f"{one['sr']:.1f} / {one['spl']:.1f}",
+        f"{one['sr_low']:.0f}-{one['sr_high']:.0f} / {one['spl_low']:.0f}-{one['spl_high']:.0f}",
+        f"{one['sr_std']:.1f} / {one['spl_std']:.1f}",
+        f"{one['paper_sr']:.1f} / {one['paper_spl']:.1f}",
+    ]
+    stacked = "{}<br>[{}]<br>± {}<br>({})".format(*lines)
+    assert f"| `greedy` | {stacked} | " in markdown(cells, ["ring", "a_b"])
+    assert " \\\\ ".join((lines[0], f"[{lines[1]}]")) in latex(cells, ["ring", "a_b"])
+    console = Console(file=io.StringIO(), width=120)
+    console.print(terminal(cells, ["greedy"]))
+    shown = console.file.getvalue().splitlines()
+    first = next(n for n, line in enumerate(shown) if line.startswith("  ring"))
+    assert shown[first - 1].startswith("greedy · var · resonance · once (privileged")
+    names = ("ring", "95 %", "± over seeds", "Gan et al. 2020")
+    for name, own, line in zip(names, lines, shown[first:], strict=False):
+        assert line.strip().startswith(name)
+        assert line.strip().removeprefix(name).strip().startswith(own)
+
+
+def test_one_seed_has_no_spread_and_an_agent_of_ones_own_no_paper():
+    walked = episodes(0, 0.3, agent="mine")
+    cells = published(summarise(walked), walked)
     text = markdown(cells, ["ring", "a_b"])
-    assert "### ring" in text and "### all" in text  # noqa: PT018
-    line = next(line for line in text.splitlines() if line.startswith("| `greedy`"))
+    line = next(line for line in text.splitlines() if line.startswith("| `mine`"))
     assert line.count("|") == 5
-    assert line.count("[") == 1
-    assert "(" in line
+    assert line.count("[") == 3
+    assert "±" not in line
+    assert "(" not in line
 
 
 def test_latex_escapes_names_and_has_as_many_cells_as_columns(table):

@@ -1,18 +1,21 @@
-"""The results as the paper lays them out, as Markdown and LaTeX, beside the paper's own figures."""
+"""The whole table as the paper lays it out, for a terminal, Markdown and LaTeX."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from rich.table import Table
 
 from avn.reporting.results import ALL_SOUNDS, AVERAGE, LABELS, across_seeds, summarise
-from avn.reporting.table import PAPER_PROTOCOL, paper_table
+from avn.reporting.table import PAPER, PAPER_PROTOCOL, paper_table, readable
 
 # One seed for all, so that the episodes of several seeds are one run with one interval.
 _POOLED = -1
+# What stands in a cell.
+OWN, INTERVAL, SPREAD = "own", "95 %", "± over seeds"
 
 
 def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
@@ -46,55 +49,97 @@ def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
     return found.merge(paper, on=["agent", "protocol", "sound", "room"], how="left", sort=False)
 
 
-def markdown(table: pd.DataFrame, sounds: Sequence[str]) -> str:
-    """A table for each sound: agents down, rooms across, the paper's figures under ours."""
-    lines = [
-        "Success rate / SPL in %; in brackets the paper's; of the average the 95 % interval.",
+def paper_averages() -> dict[str, str]:
+    """The paper's success rate and SPL of each row, over all sounds and rooms."""
+    paper = paper_table()
+    average = paper[paper["room"] == AVERAGE].groupby("agent")[["sr", "spl"]].mean()
+    return {
+        str(row): _pair(*figures)
+        for row, figures in zip(average.index, average.to_numpy(), strict=True)
+    }
+
+
+def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
+    """The table for a terminal; agents named in `privileged` are marked as bounds."""
+    rooms = list(dict.fromkeys(cells["room"]))
+    table = Table(title="success rate / SPL, %", box=None, pad_edge=False, title_justify="left")
+    table.add_column("", no_wrap=True)
+    for room in rooms:
+        table.add_column(readable(room), justify="right", no_wrap=True)
+    for keys, own in cells.groupby(list(LABELS), sort=False):
+        labels = [str(key) for key in keys]
+        mark = " (privileged: a bound)" if labels[0] in privileged else ""
+        table.add_row(f"[bold]{' · '.join(labels)}{mark}[/bold]")
+        for sound, part in own.groupby("sound", sort=False):
+            lines = pd.DataFrame(map(_lines, _in_rooms(part, rooms)))
+            table.add_row(f"  {sound}", *lines[OWN])
+            for name in (INTERVAL, SPREAD, PAPER):
+                if lines[name].any():
+                    table.add_row(f"    {name}", *lines[name], style="dim")
+    return table
+
+
+def markdown(cells: pd.DataFrame, sounds: Sequence[str]) -> str:
+    """A table for each sound: agents down, rooms across, what belongs to a cell under it."""
+    text = [
+        "Success rate / SPL in %; under them the 95 % interval, the standard deviation over "
+        "seeds, and in brackets the paper's.",
         "",
     ]
-    for sound, part in _by_sound(table, sounds):
+    for sound, part in _by_sound(cells, sounds):
         rooms = list(dict.fromkeys(part["room"]))
-        lines += [
-            f"### {sound}",
-            "",
-            f"| | {' | '.join(rooms)} |",
-            "| --- " * (1 + len(rooms)) + "|",
-        ]
+        text += [f"### {sound}", "", f"| | {' | '.join(map(readable, rooms))} |"]
+        text.append("| --- " * (1 + len(rooms)) + "|")
         for agent, own in part.groupby("agent", sort=False):
-            found = own.set_index("room").reindex(rooms)
-            found["average"] = found.index == AVERAGE
-            cells = [_cell(row) for row in found.to_dict("records")]
-            lines.append(f"| `{agent}` | {' | '.join(cells)} |")
-        lines.append("")
-    return "\n".join(lines)
+            found = [_stacked(_lines(row), "<br>") for row in _in_rooms(own, rooms)]
+            text.append(f"| `{agent}` | {' | '.join(found)} |")
+        text.append("")
+    return "\n".join(text)
 
 
-def latex(table: pd.DataFrame, sounds: Sequence[str]) -> str:
-    """The same as one `tabular`, success over SPL in each cell as the paper has it."""
-    rooms = list(dict.fromkeys(table["room"]))
-    lines = ["\\begin{tabular}{ll" + "c" * len(rooms) + "}", "\\hline"]
-    lines.append(" & ".join(["Sound", "Agent", *map(_escaped, rooms)]) + " \\\\ \\hline")
-    for sound, part in _by_sound(table, sounds):
+def latex(cells: pd.DataFrame, sounds: Sequence[str]) -> str:
+    """The same as one `tabular` with a `\\shortstack` in each cell."""
+    rooms = list(dict.fromkeys(cells["room"]))
+    text = ["\\begin{tabular}{ll" + "c" * len(rooms) + "}", "\\hline"]
+    text.append(" & ".join(["Sound", "Agent", *map(readable, rooms)]) + " \\\\ \\hline")
+    for sound, part in _by_sound(cells, sounds):
         for agent, own in part.groupby("agent", sort=False):
-            found = own.set_index("room").reindex(rooms)
-            cells = [_pair(row["sr"], row["spl"]) for row in found.to_dict("records")]
-            lines.append(" & ".join([_escaped(sound), _escaped(str(agent)), *cells]) + " \\\\")
-        lines.append("\\hline")
-    return "\n".join([*lines, "\\end{tabular}", ""])
+            stacks = [_stacked(_lines(row), " \\\\ ") for row in _in_rooms(own, rooms)]
+            found = ["\\shortstack{" + stack.replace("±", "$\\pm$") + "}" for stack in stacks]
+            text.append(" & ".join([_escaped(sound), _escaped(str(agent)), *found]) + " \\\\")
+        text.append("\\hline")
+    return "\n".join([*text, "\\end{tabular}", ""])
 
 
-def _by_sound(table: pd.DataFrame, sounds: Sequence[str]) -> list[tuple[str, pd.DataFrame]]:
+def _by_sound(cells: pd.DataFrame, sounds: Sequence[str]) -> list[tuple[str, pd.DataFrame]]:
     """The parts of a table, those of all sounds together last."""
     named = [*sounds, *([ALL_SOUNDS] if len(sounds) > 1 else [])]
-    return [(sound, table[table["sound"] == sound]) for sound in named]
+    return [(sound, cells[cells["sound"] == sound]) for sound in named]
 
 
-def _cell(row: dict[Hashable, Any]) -> str:
-    own, paper = _pair(row["sr"], row["spl"]), _pair(row["paper_sr"], row["paper_spl"])
-    low = _pair(row["sr_low"], row["spl_low"])
-    high = _pair(row["sr_high"], row["spl_high"])
-    interval = f" [{low} to {high}]" if row["average"] and low else ""
-    return own + interval + (f" ({paper})" if paper else "")
+def _in_rooms(part: pd.DataFrame, rooms: list[str]) -> list[dict[Hashable, Any]]:
+    """The cells of one agent and sound, in the order of the rooms."""
+    return part.set_index("room").reindex(rooms).to_dict("records")
+
+
+def _lines(row: dict[Hashable, Any]) -> dict[str, str]:
+    """What stands in one cell, line by line; empty where there is nothing to say."""
+    ends = [
+        f"{row['sr_low']:.0f}-{row['sr_high']:.0f}",
+        f"{row['spl_low']:.0f}-{row['spl_high']:.0f}",
+    ]
+    return {
+        OWN: _pair(row["sr"], row["spl"]),
+        INTERVAL: "" if np.isnan(row["sr_low"]) else " / ".join(ends),
+        SPREAD: _pair(row["sr_std"], row["spl_std"]),
+        PAPER: _pair(row["paper_sr"], row["paper_spl"]),
+    }
+
+
+def _stacked(lines: dict[str, str], between: str) -> str:
+    marked = {INTERVAL: "[{}]", SPREAD: "± {}", PAPER: "({})"}
+    found = [marked.get(name, "{}").format(line) for name, line in lines.items() if line]
+    return between.join(found)
 
 
 def _pair(sr: float, spl: float) -> str:

@@ -38,7 +38,7 @@ def results_table(results: pd.DataFrame, privileged: Collection[str] = ()) -> Ta
     table = Table(title="success rate / SPL, %", box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
     for room in rooms:
-        table.add_column(_readable(room), justify="right", no_wrap=True)
+        table.add_column(readable(room), justify="right", no_wrap=True)
     paper = _paper_cells()
     columns = ["agent", "protocol", "acoustics", "look"]
     for keys, run in results.groupby(columns, sort=False):
@@ -94,7 +94,7 @@ def hardness_table(episodes: pd.DataFrame) -> Table:
     for room, count, row in zip(described.index, described["episodes"], shares, strict=True):
         other, hidden, detour, geodesic = row
         cells = (f"{100 * other:.0f} %", f"{100 * hidden:.0f} %", f"{detour:.2f}")
-        table.add_row(_readable(str(room)), str(count), *cells, f"{geodesic:.1f} m")
+        table.add_row(readable(str(room)), str(count), *cells, f"{geodesic:.1f} m")
     return table
 
 
@@ -123,7 +123,7 @@ def heard_table(heard: pd.DataFrame) -> Table:
 
 def print_heard(heard: pd.DataFrame, console: Console | None = None) -> None:
     """Print what a sound network hears."""
-    (console or _console()).print(heard_table(heard))
+    (console or wide_console()).print(heard_table(heard))
 
 
 def print_tables(
@@ -133,13 +133,13 @@ def print_tables(
     privileged: Collection[str] = (),
 ) -> None:
     """Print the results and how hard the starts are."""
-    console = console or _console()
+    console = console or wide_console()
     for table in (results_table(results, privileged), hardness_table(episodes)):
         console.print(table)
         console.print()
 
 
-def _console() -> Console:
+def wide_console() -> Console:
     """A console that does not cut the table off where the output is a file or a pipe."""
     console = Console()
     return console if console.is_terminal else Console(width=120)
@@ -164,5 +164,6 @@ def _cell(sr: float, spl: float) -> str:
     return "/".join("100" if value >= 99.95 else f"{value:.1f}" for value in (sr, spl))
 
 
-def _readable(room: str) -> str:
+def readable(room: str) -> str:
+    """The name of a room for people."""
     return room.replace("_", " ").capitalize()
