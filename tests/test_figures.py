@@ -53,7 +53,7 @@ def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(com
         settings, metrics = hparams(found, run)
         assert settings["agent"].string_value == agent
         assert settings["seed"].number_value == 0
-        assert metrics == {"sr", "spl"}
+        assert {"sr", "spl"} <= metrics
         assert metrics <= set(found.Runs()[run]["scalars"])
         assert "spl/all/average" in found.Runs()[run]["scalars"]
     assert any(tag.startswith("figures/") for tag in found.Runs()[run]["images"])

@@ -105,7 +105,7 @@ def evaluate(cfg: DictConfig) -> Path:
 
 def _walking_time(cfg: DictConfig) -> float:
     """Seconds that a run takes on two cores, roughly, once all that it needs is there."""
-    return 30.0 if cfg.planner._target_ else 10.0
+    return 10.0 if cfg.planner._target_ else 3.0
 
 
 def _walk(cfg: DictConfig, folder: Path) -> None:

@@ -42,7 +42,8 @@ class A3CConfig:
     total : int
         Actions in all, of all workers together.
     order : {"free", "round_robin"}
-        Whether gradients are applied as they come, or worker by worker, which is exact.
+        Whether gradients are applied as they come, or worker by worker, so that the same seed gives
+        the same bytes; workers gather at the same time either way.
     collector : {"lean", "torchrl"}
         What gathers the batches; both give the same ones.
     lr, alpha, eps, schedule
@@ -70,7 +71,7 @@ class A3CConfig:
     episodes: int = 64
     steps: int = 20
     total: int = 3_000_000
-    order: str = "free"
+    order: str = "round_robin"
     collector: str = "lean"
     lr: float = 7e-4
     alpha: float = 0.99
