@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
 from avn import (
     evaluation,
@@ -18,7 +18,7 @@ from avn import (
     senses,
     sound_features,
 )
-from avn.stages import Stage, ask
+from avn.stages import Stage, ask, digest
 
 Make = Callable[[], object]
 
@@ -58,10 +58,17 @@ def steps(configs: Sequence[DictConfig]) -> list[Step]:
         Where an option of one of them cannot work.
     """
     own = [(ask(partial(evaluation.evaluate, cfg)), cfg) for cfg in configs]
-    to_walk = [cfg for run, cfg in own if run.missing]
+    # seeds of one row need the same
+    first = {_without_seed(cfg): cfg for run, cfg in reversed(own) if run.missing}
+    rows = {id(cfg): set(evaluation.wanted_by(cfg)) - _shown(cfg) for cfg in first.values()}
+    featured = {
+        listening.hear_hash(cfg): cfg
+        for cfg in first.values()
+        if "sound_feature" in rows[id(cfg)] and listening.hears(cfg)
+    }
     found: dict[tuple[str, str], Step] = {}
     for run, cfg in own:
-        for make in _needed(cfg, to_walk) if run.missing else ():
+        for make in _needed(cfg, rows[id(cfg)], featured) if id(cfg) in rows else ():
             stage = ask(make)
             found.setdefault((str(stage.folder), stage.what), Step(stage, make))
         walk = partial(evaluation.evaluate, cfg)
@@ -69,8 +76,17 @@ def steps(configs: Sequence[DictConfig]) -> list[Step]:
     return [*found.values()]
 
 
-def _needed(cfg: DictConfig, others: Sequence[DictConfig]) -> Iterator[Make]:
-    wanted = set(evaluation.wanted_by(cfg)) - _shown(cfg)
+def _without_seed(cfg: DictConfig) -> str:
+    plain = OmegaConf.to_container(cfg, resolve=True)
+    assert isinstance(plain, dict)
+    return digest({key: value for key, value in plain.items() if key != "seed"})
+
+
+def _needed(cfg: DictConfig, wanted: set[str], featured: dict[str, DictConfig]) -> Iterator[Make]:
+    """What makes the stages of a row.
+
+    `featured` are configs for which features of clips are made, by what listens to which clips.
+    """
     learns = reinforcement.learns(cfg)
     parts = (*reinforcement.PARTS, cfg.part) if learns else (cfg.part,)
     rooms = pipeline.scenes(cfg, parts)
@@ -84,7 +100,7 @@ def _needed(cfg: DictConfig, others: Sequence[DictConfig]) -> Iterator[Make]:
         yield partial(listening.stop_model, cfg)
         yield partial(listening.stop_scores, cfg, rooms[cfg.part])
     if listening.hears(cfg) and wanted & {"sound", "sound_feature"}:
-        yield from _heard(cfg, wanted, others)
+        yield from _heard(cfg, wanted, featured)
     if learns:
         yield partial(reinforcement.policy, cfg)
 
@@ -108,15 +124,14 @@ def _seen(cfg: DictConfig, wanted: set[str], parts: Sequence[str]) -> Iterator[M
             yield partial(seeing.windows, cfg, pipeline.scenes(cfg, (part,))[part])
 
 
-def _heard(cfg: DictConfig, wanted: set[str], others: Sequence[DictConfig]) -> Iterator[Make]:
+def _heard(cfg: DictConfig, wanted: set[str], featured: dict[str, DictConfig]) -> Iterator[Make]:
     if reinforcement.learns(cfg):
         for part in reinforcement.PARTS:
             yield _features(cfg, part, reinforcement.clips_of(cfg, part))
     # estimates come with the features, so that every clip is listened to once
-    for other in filter(listening.hears, others):
-        featured = "sound_feature" in evaluation.wanted_by(other)
-        if featured and listening.hear_hash(other) == listening.hear_hash(cfg):
-            yield _features(other, cfg.part, sound_features.evaluated_clips(other))
+    other = featured.get(listening.hear_hash(cfg))
+    if other is not None:
+        yield _features(other, cfg.part, sound_features.evaluated_clips(other))
     if "sound" in wanted:
         yield partial(listening.hearing, cfg, pipeline.scenes(cfg, (cfg.part,))[cfg.part])
 

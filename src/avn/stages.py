@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,12 @@ def digest(*parts: Any) -> str:
 
 def file_hash(path: Path) -> str:
     """SHA-256, in hex, of a file's bytes."""
+    found = path.stat()
+    return _file_hash(path, found.st_mtime_ns, found.st_size)
+
+
+@lru_cache(maxsize=64)
+def _file_hash(path: Path, changed: int, size: int) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
