@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import sys
 import time
 from collections.abc import Sequence
@@ -93,14 +94,14 @@ def _average(folders: Sequence[Path]) -> str:
 def _runs(cfg: DictConfig, row: str) -> list[DictConfig]:
     """The configs of a row: each seed, and each network where something in it is trained."""
     shared = [o for o in HydraConfig.get().overrides.task if o.split("=")[0] not in _OWN]
+    composed = _composed([*shared, f"agent={row}"], cfg.sounds)
+    trained = listening.hears(composed) or reinforcement.learns(composed)
     runs = []
     for seed in cfg.seeds:
-        first = _composed([*shared, f"agent={row}", f"seed={seed}"], cfg.sounds)
-        trained = listening.hears(first) or reinforcement.learns(first)
-        networks = cfg.train_seeds if trained else cfg.train_seeds[:1]
-        for train_seed in networks:
-            own = [f"agent={row}", f"seed={seed}", f"train_seed={train_seed}"]
-            runs.append(_composed([*shared, *own], cfg.sounds))
+        for train_seed in cfg.train_seeds if trained else cfg.train_seeds[:1]:
+            own = copy.deepcopy(composed)  # composing takes Hydra a while
+            own.seed, own.train_seed = seed, train_seed
+            runs.append(own)
     return runs
 
 
