@@ -184,6 +184,9 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
             return _one_line(str(link))
         if isinstance(link, OverrideParseException):
             return f"{link.override}: cannot be read; put quotes round what Hydra reads as grammar"
+        if isinstance(link, AssertionError) and (key := _overridden(link)):
+            part = key.rpartition(".")[0]
+            return f"{key}: '{part}' is null in this config; leave it out"
     for link in chain:
         if isinstance(link, OSError) and link.filename and not isinstance(link, HydraException):
             return _one_line(f"{link.filename}: {link.strerror}")
@@ -191,6 +194,14 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
         first, *causes = dict.fromkeys(_one_line(str(link)) for link in chain if str(link))
         return "; ".join([first, *(cause for cause in causes[:1] if cause not in first)])
     return None
+
+
+def _overridden(error: BaseException) -> str:
+    """The key that Hydra was about to set; what OmegaConf asserts does not name it."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        if frame.f_code.co_name == "_apply_overrides_to_config":
+            return str(frame.f_locals.get("key") or "")
+    return ""
 
 
 def _one_line(text: str) -> str:
