@@ -7,6 +7,7 @@ from small import A3C, EYES, SMALL
 
 from avn import config, preparation
 from avn.cli import conf_folder
+from avn.learned import METRICS
 
 ALL_ROWS = ("greedy", "a3c_va", "a3c_va_m_mapper", "ours_noexp")
 
@@ -33,21 +34,25 @@ def test_each_stage_is_named_once_and_before_what_needs_it(plan):
     planned = plan(*ALL_ROWS, seeds=(0, 1))
     found = names(planned)
     assert len(set(found)) == len(found)
+    assert "what 'cnn5' hears in room_1" not in found
     assert all(step.stage.missing and step.stage.seconds > 0 for step in planned)
     order = [
-        "sound of the train, validation, test apartments of 'mini' (resonance)",
+        "sound of the test apartments of 'mini' (resonance)",
+        "sound of the train apartments of 'mini' (resonance)",
+        "sound of the validation apartments of 'mini' (resonance)",
         "sound network 'cnn5' (resonance, train_seed 0)",
-        # with it come the estimates that the next one asks for
+        # with it come the estimates that the next one needs
         "sound features by 'cnn5' in room_1",
-        "what 'cnn5' hears in room_1",
         "run of 'greedy' (seed 0, train_seed 0)",
         "run of 'greedy' (seed 1, train_seed 0)",
-        "views of the train, validation, test apartments of 'mini' (raycast)",
+        "features of the train views (efficientnet_lite0)",
         "agent 'a3c_va' (resonance, var, train_seed 0)",
+        "views of the test apartments of 'mini' (raycast)",
         "run of 'a3c_va' (seed 0, train_seed 0)",
+        "2 looks of the train apartments of 'mini' (raycast)",
         "occupancy network 'small' (raycast, train_seed 0)",
-        "what occupancy network 'small' sees in room_1",
         "agent 'a3c_va_m_mapper' (resonance, var, train_seed 0)",
+        "what occupancy network 'small' sees in room_1",
         "run of 'ours_noexp' (seed 1, train_seed 0)",
     ]
     assert [found.index(name) for name in order] == sorted(found.index(name) for name in order)
@@ -70,8 +75,20 @@ def test_what_is_made_was_planned_and_then_nothing_is_missing(plan, capfd):
         step.make()
     said = capfd.readouterr().out.splitlines()
     made = [line.split(" is missing: ")[0] for line in said if " is missing: making it" in line]
-    # the looks of the training apartments are a part of training; what is found made is not said
-    assert [name for name in made if "looks" not in name] == [
-        name for name in names(steps) if name != "what 'cnn5' hears in room_1"
-    ]
+    assert made == names(steps)
     assert not any(step.stage.missing for step in plan(*rows, options=options))
+
+
+def test_what_a_present_stage_was_made_of_is_not_asked_for(plan, tmp_path):
+    (found,) = [step for step in plan("ours_noexp") if "occupancy network" in step.stage.what[:20]]
+    metrics = found.stage.folder / METRICS
+    metrics.parent.mkdir(parents=True)
+    metrics.touch()
+    left = names(plan("ours_noexp"))
+    assert not [name for name in left if "looks" in name or "views of the train" in name]
+
+
+def test_one_row_twice_and_one_network_for_two_train_seeds_walk_once(plan):
+    twice = plan("greedy", "greedy")
+    assert names(twice) == names(plan("greedy"))
+    assert len([step for step in twice if step.run is not None]) == 1

@@ -6,7 +6,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from avn.errors import UserError
-from avn.stages import digest, make_once, written_whole
+from avn.stages import Stage, ask, digest, make_once, written_whole
 
 
 def test_a_hash_is_of_the_values_and_not_of_their_order():
@@ -57,3 +57,27 @@ def test_two_at_once_make_it_once(tmp_path):
         process.join()
     assert [process.exitcode for process in both] == [0, 0]
     assert (tmp_path / "made").read_text() == "once\n"
+
+
+def test_a_stage_may_need_another_of_its_own_folder(tmp_path):
+    made = []
+
+    def outer():
+        make_once(tmp_path / "a", "the inner", lambda: False, lambda: made.append("inner"))
+        made.append("outer")
+
+    make_once(tmp_path / "a", "the outer", lambda: False, outer)
+    assert made == ["inner", "outer"]
+
+
+def test_asking_neither_makes_nor_opens_and_leaves_no_trace(tmp_path):
+    def make():
+        make_once(tmp_path / "a", "a thing", lambda: False, pytest.fail, seconds=90.0)
+        pytest.fail("opened")
+
+    assert ask(make) == Stage("a thing", tmp_path / "a", 90.0, missing=True)
+    with pytest.raises(ZeroDivisionError):
+        ask(lambda: 1 / 0)
+    made = []
+    make_once(tmp_path / "a", "a thing", lambda: False, lambda: made.append(1))
+    assert made == [1]

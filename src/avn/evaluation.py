@@ -46,6 +46,11 @@ def wanted_by(cfg: DictConfig) -> tuple[str, ...]:
     return build_agent(cfg).wants(instantiate(cfg.protocol))
 
 
+def label(cfg: DictConfig) -> str:
+    """The name of the config's agent in tables; it tells which parts of the truth it is given."""
+    return "-true-".join((cfg.agent.name, *cfg.agent.truth))
+
+
 def run_folder_name(cfg: DictConfig) -> str:
     """`<agent>/<sounds>/seed<seed>-<hash8>`: the folder of a run under `outputs/eval`."""
     sounds = "-".join(listening.sound_files(cfg))
@@ -148,7 +153,7 @@ def walk_rooms(
     protocol: Protocol = instantiate(cfg.protocol)
     agent = build_agent(cfg, ready=True)
     labels = Labels(
-        agent="-true-".join((cfg.agent.name, *cfg.agent.truth)),
+        agent=label(cfg),
         acoustics=cfg.acoustics.name,
         look=cfg.look if cfg.planner._target_ else "once",
     )
@@ -198,7 +203,7 @@ def read(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def show(cfg: DictConfig, folder: Path) -> None:
     """Print the table of a run's folder by room and sound, and how hard its episodes are."""
-    privileged = [cfg.agent.name] if cfg.agent.privileged else []
+    privileged = [label(cfg)] if cfg.agent.privileged else []
     runs, episodes = read(folder)
     table.print_tables(runs, episodes, privileged=privileged)
     if (folder / HEARD).is_file():

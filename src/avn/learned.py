@@ -35,7 +35,7 @@ def trained(
     data: Callable[[], L.LightningDataModule],
     measure: Callable[[Trained, Any], dict[str, Any]] | None = None,
     asked: bool = False,
-    seconds: float = 300.0,
+    seconds: float = 0.0,
 ) -> Trained:
     """Give a network its weights; train it where they are missing.
 

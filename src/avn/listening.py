@@ -129,7 +129,8 @@ def sound_model(cfg: DictConfig, asked: bool = False) -> tuple[SoundCnn, Path]:
     def data() -> SoundData:
         return SoundData(**_training_set(cfg), recipe=pipeline.typed(cfg.sound_model))
 
-    return trained(cfg, model, folder, title, data, asked=asked), folder
+    seconds = _time(cfg, cfg.sound_model)
+    return trained(cfg, model, folder, title, data, asked=asked, seconds=seconds), folder
 
 
 def stop_model(cfg: DictConfig, asked: bool = False) -> tuple[StopClassifier, Path]:
@@ -151,7 +152,13 @@ def stop_model(cfg: DictConfig, asked: bool = False) -> tuple[StopClassifier, Pa
             goal=lambda scene: protocol.goal_cells(scene.grid, scene.sources),
         )
 
-    return trained(cfg, model, folder, title, data, _stop_figures, asked), folder
+    seconds = _time(cfg, cfg.stop_model)
+    return trained(cfg, model, folder, title, data, _stop_figures, asked, seconds), folder
+
+
+def _time(cfg: DictConfig, recipe: DictConfig) -> float:
+    """Seconds that training takes on two cores, roughly."""
+    return float(4 * pipeline.pairs(cfg, "train")[0] * recipe.epochs / 600)
 
 
 def _training_set(cfg: DictConfig) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from avn.acoustics.brir import AcousticsConfig, check_config
 from avn.apartments.floor_plan import FloorPlan
+from avn.apartments.grid import build_grid
 from avn.apartments.splits import SplitConfig, load_split
 from avn.dataset import build, scene
 from avn.dataset.build_views import build_views, views_hash, views_made
@@ -46,6 +47,12 @@ def _plans(key: str, split: SplitConfig) -> dict[str, list[FloorPlan]]:
     if key not in _PLANS:
         _PLANS[key] = load_split(split)
     return _PLANS[key]
+
+
+def pairs(cfg: DictConfig, part: str) -> tuple[int, int]:
+    """How many pairs of source and free cell, and how many free cells, the apartments have."""
+    found = [(len(plan.sources), build_grid(plan).cells) for plan in plans(cfg)[part]]
+    return sum(sources * cells for sources, cells in found), sum(cells for _, cells in found)
 
 
 def scenes_folder(cfg: DictConfig) -> Path:

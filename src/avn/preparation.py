@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 from omegaconf import DictConfig, OmegaConf
 
@@ -18,6 +19,8 @@ from avn import (
     senses,
     sound_features,
 )
+from avn.dataset.scene import Scene
+from avn.sound_features import Clips
 from avn.stages import Stage, ask, digest
 
 Make = Callable[[], object]
@@ -45,7 +48,7 @@ class Step:
 def steps(configs: Sequence[DictConfig]) -> list[Step]:
     """What some runs need, each stage once and before the first run that needs it, and the runs.
 
-    The stages of runs that are there already are left out.
+    Left out are the stages of what is there already.
 
     Parameters
     ----------
@@ -66,13 +69,13 @@ def steps(configs: Sequence[DictConfig]) -> list[Step]:
         for cfg in first.values()
         if "sound_feature" in rows[id(cfg)] and listening.hears(cfg)
     }
-    found: dict[tuple[str, str], Step] = {}
+    found: dict[Hashable, Step] = {}
     for run, cfg in own:
         for make in _needed(cfg, rows[id(cfg)], featured) if id(cfg) in rows else ():
             stage = ask(make)
-            found.setdefault((str(stage.folder), stage.what), Step(stage, make))
+            found.setdefault((stage.folder, stage.what), Step(stage, make))
         walk = partial(evaluation.evaluate, cfg)
-        found.setdefault((str(run.folder), run.what), Step(run, walk, cfg))
+        found.setdefault(run.folder, Step(run, walk, cfg))
     return [*found.values()]
 
 
@@ -82,60 +85,94 @@ def _without_seed(cfg: DictConfig) -> str:
     return digest({key: value for key, value in plain.items() if key != "seed"})
 
 
-def _needed(cfg: DictConfig, wanted: set[str], featured: dict[str, DictConfig]) -> Iterator[Make]:
-    """What makes the stages of a row.
-
-    `featured` are configs for which features of clips are made, by what listens to which clips.
-    """
-    learns = reinforcement.learns(cfg)
-    parts = (*reinforcement.PARTS, cfg.part) if learns else (cfg.part,)
-    rooms = pipeline.scenes(cfg, parts)
-    if wanted & set(senses.SIGHTS):
-        yield from _seen(cfg, wanted, parts)
-    if listening.hears(cfg) and wanted & {"sound", "sound_feature"}:
-        yield partial(pipeline.scenes, cfg, _all_parts(cfg), audible=True)
-        yield partial(listening.sound_model, cfg)
-    if listening.can_stop(cfg) and "reach" in wanted:
-        yield partial(pipeline.scenes, cfg, _all_parts(cfg), audible=True)
-        yield partial(listening.stop_model, cfg)
-        yield partial(listening.stop_scores, cfg, rooms[cfg.part])
-    if listening.hears(cfg) and wanted & {"sound", "sound_feature"}:
-        yield from _heard(cfg, wanted, featured)
-    if learns:
-        yield partial(reinforcement.policy, cfg)
-
-
 def _shown(cfg: DictConfig) -> set[str]:
     """Observations that an agent is shown the truth of."""
     return {{"location": "sound"}.get(truth, truth) for truth in cfg.agent.truth}
 
 
-def _all_parts(cfg: DictConfig) -> list[str]:
-    return [part for part, found in pipeline.plans(cfg).items() if found]
+def _needed(cfg: DictConfig, wanted: set[str], featured: dict[str, DictConfig]) -> Iterator[Make]:
+    """What makes the stages of a row.
 
-
-def _seen(cfg: DictConfig, wanted: set[str], parts: Sequence[str]) -> Iterator[Make]:
-    yield partial(pipeline.seen_scenes, cfg, _all_parts(cfg))
-    if "feature" in wanted:
-        yield partial(recognition.features, cfg, parts)
-    if "window" in wanted and seeing.sees_windows(cfg):
-        yield partial(seeing.occupancy_model, cfg)
-        for part in parts:
-            yield partial(seeing.windows, cfg, pipeline.scenes(cfg, (part,))[part])
-
-
-def _heard(cfg: DictConfig, wanted: set[str], featured: dict[str, DictConfig]) -> Iterator[Make]:
+    `featured` are configs for which features of clips are made, by what listens to which clips.
+    """
     if reinforcement.learns(cfg):
-        for part in reinforcement.PARTS:
-            yield _features(cfg, part, reinforcement.clips_of(cfg, part))
-    # estimates come with the features, so that every clip is listened to once
+        learnt = (
+            _observed(cfg, wanted, part, reinforcement.clips_of(cfg, part))
+            for part in reinforcement.PARTS
+        )
+        yield from _before(partial(reinforcement.policy, cfg), chain.from_iterable(learnt))
+    if wanted & set(senses.SOUNDS) and (listening.hears(cfg) or listening.can_stop(cfg)):
+        yield from _audible(cfg, (cfg.part,))
+    if "sound" in wanted and listening.hears(cfg):
+        yield from _estimates(cfg, featured)
+    if "reach" in wanted and listening.can_stop(cfg):
+        scores = partial(listening.stop_scores, cfg, _rooms(cfg, cfg.part))
+        # the network is opened for its threshold too
+        yield from _before(partial(listening.stop_model, cfg), _audible(cfg, seeing.TRAINED_ON))
+        yield from _before(scores, ())
+    yield from _observed(cfg, wanted, cfg.part, sound_features.evaluated_clips(cfg))
+
+
+def _before(product: Make, needs: Iterable[Make]) -> Iterator[Make]:
+    """What makes a product, where it is missing, after what it needs."""
+    if ask(product).missing:
+        yield from needs
+        yield product
+
+
+def _rooms(cfg: DictConfig, part: str) -> list[Scene]:
+    return pipeline.scenes(cfg, (part,))[part]
+
+
+def _audible(cfg: DictConfig, parts: Sequence[str]) -> list[Make]:
+    # part by part, so that what two stages need is one stage
+    return [partial(pipeline.scenes, cfg, (part,), audible=True) for part in parts]
+
+
+def _views(cfg: DictConfig, parts: Sequence[str]) -> list[Make]:
+    return [partial(pipeline.seen_scenes, cfg, (part,)) for part in parts]
+
+
+def _observed(cfg: DictConfig, wanted: set[str], part: str, clips: Clips) -> Iterator[Make]:
+    """What an agent sees in the apartments of a part, and features of what it hears there."""
+    views = _views(cfg, (part,))
+    if wanted & {"view", "depth"}:
+        yield from views
+    if "feature" in wanted:
+        yield from _before(partial(recognition.features, cfg, (part,)), views)
+    if "window" in wanted and seeing.sees_windows(cfg):
+        windows = partial(seeing.windows, cfg, _rooms(cfg, part))
+        yield from _before(windows, chain(views, _occupancy_network(cfg)))
+    if "sound_feature" in wanted and listening.hears(cfg):
+        yield from _features(cfg, part, clips)
+
+
+def _occupancy_network(cfg: DictConfig) -> Iterator[Make]:
+    needs = _views(cfg, seeing.TRAINED_ON)
+    if cfg.mapper.network.looks > 1:
+        needs.append(partial(seeing.make_looks, cfg))
+    yield from _before(partial(seeing.occupancy_model, cfg), needs)
+
+
+def _sound_network(cfg: DictConfig) -> Iterator[Make]:
+    yield from _before(partial(listening.sound_model, cfg), _audible(cfg, seeing.TRAINED_ON))
+
+
+def _features(cfg: DictConfig, part: str, clips: Clips) -> Iterator[Make]:
+    make = partial(sound_features.sound_features, cfg, _rooms(cfg, part), clips)
+    yield from _before(make, chain(_sound_network(cfg), _audible(cfg, (part,))))
+
+
+def _estimates(cfg: DictConfig, featured: dict[str, DictConfig]) -> Iterator[Make]:
+    """What the sound network says of every clip.
+
+    Where another row needs features of the same clips, they are made first, since the estimates of
+    a network that is symmetric come with them.
+    """
+    estimates = partial(listening.hearing, cfg, _rooms(cfg, cfg.part))
     other = featured.get(listening.hear_hash(cfg))
-    if other is not None:
-        yield _features(other, cfg.part, sound_features.evaluated_clips(other))
-    if "sound" in wanted:
-        yield partial(listening.hearing, cfg, pipeline.scenes(cfg, (cfg.part,))[cfg.part])
-
-
-def _features(cfg: DictConfig, part: str, clips: sound_features.Clips) -> Make:
-    rooms = pipeline.scenes(cfg, (part,))[part]
-    return partial(sound_features.sound_features, cfg, rooms, clips)
+    if other is not None and cfg.sound_model.symmetric:
+        if ask(estimates).missing:
+            yield from _features(other, cfg.part, sound_features.evaluated_clips(other))
+        return
+    yield from _before(estimates, _sound_network(cfg))

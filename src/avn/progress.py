@@ -31,7 +31,7 @@ class _Rate(ProgressColumn):
 def progress_columns(console: Console) -> Progress:
     """Bars with a rate and the time left, not yet shown."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         _Rate(),

@@ -18,7 +18,8 @@ from avn.cli import command
 from avn.errors import UserError
 from avn.reporting import published, results, table
 from avn.reporting.dashboard import Dashboard
-from avn.stages import digest, span, spent, stage_folder, tell, written_whole
+from avn.reporting.table import PAPER_PROTOCOL
+from avn.stages import digest, refusal, span, spent, stage_folder, tell, written_whole
 
 # Overrides that belong to this command and not to a row.
 _OWN = ("rows", "seeds", "train_seeds", "sounds")
@@ -38,17 +39,17 @@ def main(cfg: DictConfig) -> Path:
     for key in ("rows", "seeds", "train_seeds"):
         if not cfg[key]:
             raise UserError(f"{key}: empty; give at least one, such as rows=greedy seeds=0")
-    configs = [own for row in cfg.rows for own in _runs(cfg, row)]
+    configs = [own for row in dict.fromkeys(cfg.rows) for own in _runs(cfg, row)]
     folders = _walk(configs)
     tables, episodes = zip(*map(evaluation.read, folders), strict=True)
     runs, walked = pd.concat(tables), pd.concat(episodes)
-    privileged = {own.agent.name for own in configs if own.agent.privileged}
+    privileged = {evaluation.label(own) for own in configs if own.agent.privileged}
     cells = published.published(runs, walked)
     for shown in (published.terminal(cells, privileged), table.hardness_table(episodes[0])):
         table.wide_console().print(shown)
-    _compare(walked, [own.agent.name for own in configs])
     target = stage_folder(cfg.outputs, "reproduce", "table", digest([f.name for f in folders]))
-    _write(target, runs, cells, list(listening.sound_files(configs[0])))
+    _write(target, runs, cells, list(listening.sound_files(configs[0])), privileged)
+    _compare(walked)
     tell(str(target))
     return target
 
@@ -56,30 +57,31 @@ def main(cfg: DictConfig) -> Path:
 def _walk(configs: Sequence[DictConfig]) -> list[Path]:
     """Make what is missing and let all runs walk; tell the plan before, and each row at its end."""
     steps = preparation.steps(configs)
-    missing = [step.stage for step in steps if step.stage.missing]
-    for stage in missing:
-        tell(f"to make: {stage.what} (about {span(stage.seconds)})")
+    missing = [step for step in steps if step.stage.missing]
+    for step in missing:
+        if step.run is None and not configs[0].auto:
+            raise refusal(step.stage.folder, step.stage.what)
+        tell(f"to make: {step.stage.what} (about {span(step.stage.seconds)})")
     if missing:
-        tell(f"all in all about {span(sum(stage.seconds for stage in missing))}")
-    rows = list(dict.fromkeys(cfg.agent.name for cfg in configs))
-    left = [cfg.agent.name for cfg in configs]
+        tell(f"all in all about {span(sum(step.stage.seconds for step in missing))}")
+    left = [step.run.agent.name for step in steps if step.run is not None]
+    walked: dict[str, list[Path]] = {row: [] for row in left}
+    paper = published.paper_averages() if configs[0].protocol.name == PAPER_PROTOCOL else {}
     started = time.monotonic()
-    walked: dict[str, list[Path]] = {row: [] for row in rows}
-    with Dashboard(missing, rows, published.paper_averages()) as board:
+    with Dashboard([step.stage for step in missing], list(walked), paper) as board:
         for step in steps:
             if step.stage.missing:
                 step.make()
                 board.made()
             if step.run is None:
                 continue
-            row = step.run.agent.name
+            row = left.pop(0)
             walked[row].append(step.stage.folder)
-            left.remove(row)
             board.fill(row, _average(walked[row]))
             if row not in left:
                 passed = span(time.monotonic() - started)
                 tell(f"{row}: {_average(walked[row])} after {passed}")
-    return [folder for row in rows for folder in walked[row]]
+    return [folder for own in walked.values() for folder in own]
 
 
 def _average(folders: Sequence[Path]) -> str:
@@ -97,8 +99,9 @@ def _runs(cfg: DictConfig, row: str) -> list[DictConfig]:
     composed = _composed([*shared, f"agent={row}"], cfg.sounds)
     trained = listening.hears(composed) or reinforcement.learns(composed)
     runs = []
-    for seed in cfg.seeds:
-        for train_seed in cfg.train_seeds if trained else cfg.train_seeds[:1]:
+    networks = list(dict.fromkeys(cfg.train_seeds))
+    for seed in dict.fromkeys(cfg.seeds):
+        for train_seed in networks if trained else networks[:1]:
             own = copy.deepcopy(composed)  # composing takes Hydra a while
             own.seed, own.train_seed = seed, train_seed
             runs.append(own)
@@ -116,14 +119,16 @@ def _composed(overrides: list[str], sounds: Sequence[str]) -> DictConfig:
     return own
 
 
-def _write(target: Path, runs: pd.DataFrame, cells: pd.DataFrame, sounds: list[str]) -> None:
+def _write(
+    target: Path, runs: pd.DataFrame, cells: pd.DataFrame, sounds: list[str], privileged: set[str]
+) -> None:
     """Leave the table as CSV, Markdown and LaTeX, and where the time went."""
     results.write_csv(runs, target / evaluation.RESULTS)
     results.write_csv(results.across_seeds(runs), target / ACROSS)
     results.write_csv(cells, target / CELLS)
     for name, text in (
-        (TABLE, published.markdown(cells, sounds)),
-        (LATEX, published.latex(cells, sounds)),
+        (TABLE, published.markdown(cells, sounds, privileged)),
+        (LATEX, published.latex(cells, sounds, privileged)),
     ):
         with written_whole(target / name) as part:
             part.write_text(text, encoding="utf-8")
@@ -135,9 +140,9 @@ def _write(target: Path, runs: pd.DataFrame, cells: pd.DataFrame, sounds: list[s
             tell(f"{row.seconds:7.0f} s  {row.stage}")
 
 
-def _compare(episodes: pd.DataFrame, names: list[str]) -> None:
+def _compare(episodes: pd.DataFrame) -> None:
     """Print how much better each row is than the one before it, over the same episodes."""
-    rows = list(dict.fromkeys(names))
+    rows = list(dict.fromkeys(episodes["agent"]))
     figures = [*results.FIGURES.values()]
     keys = ["agent", "sound", "room", "seed", "episode", "source", "start_cell", "start_heading"]
     mean = episodes.groupby(keys, as_index=False)[figures].mean()  # over networks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -76,29 +76,33 @@ def occupancy_model(cfg: DictConfig, asked: bool = False) -> tuple[OccupancyCnn,
     folder = stage_folder(cfg.outputs, "train", "occupancy_cnn", model_hash(cfg))
     settings = f"{cfg.renderer.name}, train_seed {recipe.train_seed}"
     title = f"occupancy network '{recipe.name}' ({settings})"
-    return trained(cfg, model, folder, title, lambda: _data(cfg), _measure, asked), folder
+    views = 4 * pipeline.pairs(cfg, "train")[1] * recipe.times * recipe.epochs
+    data = partial(_data, cfg)
+    return trained(cfg, model, folder, title, data, _measure, asked, seconds=views / 90), folder
 
 
 def _data(cfg: DictConfig) -> ViewData:
     opened = pipeline.seen_scenes(cfg, TRAINED_ON)
     looks = range(cfg.mapper.network.looks)
-    _make_looks(cfg, opened["train"], looks)
+    make_looks(cfg)
     train = [_seen(cfg, scene, looks) for scene in opened["train"]]
     validation = [_seen(cfg, scene, range(1)) for scene in opened["validation"]]
     return ViewData(train, validation, pipeline.typed(cfg.mapper.network))
 
 
-def _make_looks(cfg: DictConfig, scenes: Sequence[Scene], looks: Sequence[int]) -> None:
+def make_looks(cfg: DictConfig) -> None:
     """Furnish, paint and light the training apartments anew, as often as the recipe says."""
+    looks = range(cfg.mapper.network.looks)
+    scenes = pipeline.scenes(cfg, ("train",))["train"]
     renderer, every = pipeline.typed(cfg.renderer), [(scene, "train") for scene in scenes]
-    count = sum(4 * scene.grid.cells for scene in scenes) * len(looks)
+    count = sum(4 * scene.grid.cells for scene in scenes) * (len(looks) - 1)
     make_once(
         pipeline.scenes_folder(cfg),
         f"{len(looks)} looks of the train apartments of '{cfg.split.name}' ({renderer.name})",
         done=lambda: views_made(every, renderer, looks),
         make=lambda: build_views(every, renderer, cfg.processes, looks),
         auto=cfg.auto,
-        seconds=count * 0.06 / cfg.processes,
+        seconds=(count * 0.06 + 60 * len(scenes) * (len(looks) - 1)) / cfg.processes,
     )
 
 

@@ -29,6 +29,8 @@ from avn.errors import UserError
 # way; and the stages that are being made, with the seconds of what they made on the way.
 spent: dict[str, float] = {}
 _within: list[float] = []
+# Folders whose locks this process holds.
+_held: set[Path] = set()
 
 
 def digest(*parts: Any) -> str:
@@ -150,7 +152,7 @@ def make_once(
     if done():
         return
     if not auto:
-        raise UserError(f"{folder}: {what} is missing and auto=false; leave auto=true to make it")
+        raise refusal(folder, what)
     with locked(folder, what):
         if done():
             return
@@ -168,6 +170,11 @@ def make_once(
         tell(f"{what} made in {span(took)}: {folder}")
 
 
+def refusal(folder: Path, what: str) -> UserError:
+    """The error where something is missing that must not be made."""
+    return UserError(f"{folder}: {what} is missing and auto=false; leave auto=true to make it")
+
+
 def span(seconds: float) -> str:
     """A length of time in words, such as `40 s` or `2.5 min`."""
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.1f} min"
@@ -175,7 +182,13 @@ def span(seconds: float) -> str:
 
 @contextmanager
 def locked(folder: Path, what: str) -> Iterator[None]:
-    """Hold the lock of a stage's folder; it is freed when the process ends, however it ends."""
+    """Hold the lock of a stage's folder; it is freed when the process ends, however it ends.
+
+    Who holds it already, since one stage of a folder needs another of the same folder, goes on.
+    """
+    if folder in _held:
+        yield
+        return
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -186,9 +199,11 @@ def locked(folder: Path, what: str) -> Iterator[None]:
     except Timeout:
         tell(f"{what} is being made by another process: waiting for it")
         lock.acquire()
+    _held.add(folder)
     try:
         yield
     finally:
+        _held.remove(folder)
         lock.release()
 
 

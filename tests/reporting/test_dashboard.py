@@ -25,8 +25,8 @@ def clock(monkeypatch):
     return own
 
 
-def board(terminal=True):
-    console = Console(file=io.StringIO(), force_terminal=terminal, width=100, height=60)
+def board(terminal=True, height=24):
+    console = Console(file=io.StringIO(), force_terminal=terminal, width=100, height=height)
     return Dashboard(STAGES, ["greedy", "ours"], {"ours": "58.7 / 39.1"}, console), console
 
 
@@ -61,11 +61,23 @@ def test_stages_and_rows_fill_as_they_are_made(clock):
         shown.made()
     shown.fill("ours", "83.3 / 73.1")
     lines = text(shown).splitlines()
-    assert lines[1].split() == ["7", "stages", "10.5", "min"]
+    assert lines[0].startswith("15.0 min passed, about 15.0 min left")
     assert any(line.split() == ["ours", "83.3", "/", "73.1", "58.7", "/", "39.1"] for line in lines)
     assert any(line.split() == ["greedy", "-", "-"] for line in lines)
-    assert any(line.startswith("3 more stages") for line in lines)
-    assert lines[-1].startswith("15.0 min passed, about 15.0 min left")
+    assert any(line.split() == ["6", "stages", "9.0", "min"] for line in lines)
+    assert any(line.split() == ["stage", "10", "1.7", "min", "0", "s", "..."] for line in lines)
+    assert any(line.startswith("0 more stages") for line in lines) is False
+
+
+@pytest.mark.parametrize("height", [24, 40])
+def test_it_fits_the_terminal(height):
+    stages = [Stage("what is made " * 20, Path("nowhere"), 100.0, True) for _ in range(40)]
+    console = Console(file=io.StringIO(), force_terminal=True, width=80, height=height)
+    shown = Dashboard(stages, [f"row_{n}" for n in range(10)], {}, console)
+    for _ in range(20):
+        shown.made()
+    with shown, progress_bar("listening", 10, "clips"):
+        assert len(console.render_lines(shown.render())) <= height
 
 
 def test_bars_stand_in_the_dashboard_as_long_as_their_work_lasts():

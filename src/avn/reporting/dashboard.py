@@ -16,8 +16,8 @@ from rich.text import Text
 from avn.progress import bars_in, progress_columns
 from avn.stages import Stage, span
 
-# Stages that are listed one by one before and after the one that is being made.
-_BEFORE, _AFTER = 3, 6
+# Lines beside the stages and rows: headings, stages taken together, bars, time.
+_OTHERS = 8
 
 
 class Dashboard:
@@ -97,15 +97,17 @@ class Dashboard:
         """All of it."""
         passed = span(time.monotonic() - self._started)
         left = f"{passed} passed, about {span(self.time_left())} left"
-        return Group(self._stage_table(), self._bars, self._row_table(), Text(left, style="bold"))
+        return Group(Text(left, style="bold"), self._row_table(), self._stage_table(), self._bars)
 
     def _stage_table(self) -> Table:
         table = Table(box=None, pad_edge=False)
-        table.add_column("stage", ratio=1)
+        table.add_column("stage", ratio=1, no_wrap=True, overflow="ellipsis")
         table.add_column("planned", justify="right")
         table.add_column("took", justify="right")
         done = len(self._took)
-        first, last = max(0, done - _BEFORE), done + 1 + _AFTER
+        lines = max(2, self._console.height - len(self._rows) - _OTHERS)
+        first = max(0, done - lines // 3)
+        last = first + lines
         if first:
             table.add_row(f"{first} stages", "", span(sum(self._took[:first])), style="dim")
         for number, stage in list(enumerate(self._stages))[first:last]:
@@ -114,7 +116,7 @@ class Dashboard:
                 took, style = span(self._took[number]), "green"
             elif number == done:
                 took, style = f"{span(time.monotonic() - self._began)} ...", "bold yellow"
-            table.add_row(stage.what, span(stage.seconds), took, style=style)
+            table.add_row(Text(stage.what), span(stage.seconds), took, style=style)
         rest = self._stages[last:]
         if rest:
             planned = span(sum(stage.seconds for stage in rest))
@@ -126,5 +128,5 @@ class Dashboard:
         for name in ("row", "SR / SPL", "paper"):
             table.add_column(name, justify="left" if name == "row" else "right")
         for name, text in self._rows.items():
-            table.add_row(name, text or "-", self._paper.get(name, "-"))
+            table.add_row(Text(name), text or "-", self._paper.get(name, "-"))
         return table

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from rich.table import Table
+from rich.text import Text
 
 from avn.reporting.results import ALL_SOUNDS, AVERAGE, LABELS, across_seeds, summarise
 from avn.reporting.table import PAPER, PAPER_PROTOCOL, paper_table, readable
@@ -16,6 +17,7 @@ from avn.reporting.table import PAPER, PAPER_PROTOCOL, paper_table, readable
 _POOLED = -1
 # What stands in a cell.
 OWN, INTERVAL, SPREAD = "own", "95 %", "± over seeds"
+ENDS = ("low", "high")
 
 
 def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
@@ -37,7 +39,7 @@ def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
     """
     keys = [*LABELS, "sound", "room"]
     intervals = summarise(episodes.assign(seed=_POOLED))
-    ends = [f"{figure}_{end}" for figure in ("sr", "spl") for end in ("low", "high")]
+    ends = [f"{figure}_{end}" for figure in ("sr", "spl") for end in ENDS]
     spread = across_seeds(runs)[[*keys, "sr", "spl", "sr_std", "spl_std"]]
     found = spread.merge(intervals[[*keys, *ends]], on=keys, how="left", sort=False)
     percent = ["sr", "spl", "sr_std", "spl_std", *ends]
@@ -62,53 +64,72 @@ def paper_averages() -> dict[str, str]:
 def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
     """The table for a terminal; agents named in `privileged` are marked as bounds."""
     rooms = list(dict.fromkeys(cells["room"]))
-    table = Table(title="success rate / SPL, %", box=None, pad_edge=False, title_justify="left")
+    title = f"success rate / SPL, % ({_settings(cells)})"
+    table = Table(title=title, box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
     for room in rooms:
         table.add_column(readable(room), justify="right", no_wrap=True)
-    for keys, own in cells.groupby(list(LABELS), sort=False):
-        labels = [str(key) for key in keys]
-        mark = " (privileged: a bound)" if labels[0] in privileged else ""
-        table.add_row(f"[bold]{' · '.join(labels)}{mark}[/bold]")
+    for agent, own in cells.groupby("agent", sort=False):
+        table.add_row(Text(_marked(str(agent), privileged), style="bold"))
         for sound, part in own.groupby("sound", sort=False):
             lines = pd.DataFrame(map(_lines, _in_rooms(part, rooms)))
-            table.add_row(f"  {sound}", *lines[OWN])
+            table.add_row(Text(f"  {sound}"), *lines[OWN])
             for name in (INTERVAL, SPREAD, PAPER):
                 if lines[name].any():
                     table.add_row(f"    {name}", *lines[name], style="dim")
     return table
 
 
-def markdown(cells: pd.DataFrame, sounds: Sequence[str]) -> str:
+def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str] = ()) -> str:
     """A table for each sound: agents down, rooms across, what belongs to a cell under it."""
     text = [
-        "Success rate / SPL in %; under them the 95 % interval, the standard deviation over "
-        "seeds, and in brackets the paper's.",
+        f"Success rate / SPL in % ({_settings(cells)}); under them the 95 % interval, the "
+        "standard deviation over seeds, and in brackets the paper's.",
         "",
     ]
     for sound, part in _by_sound(cells, sounds):
         rooms = list(dict.fromkeys(part["room"]))
-        text += [f"### {sound}", "", f"| | {' | '.join(map(readable, rooms))} |"]
+        text += [f"### {sound}", "", f"| | {' | '.join(_cell_safe(readable(r)) for r in rooms)} |"]
         text.append("| --- " * (1 + len(rooms)) + "|")
         for agent, own in part.groupby("agent", sort=False):
             found = [_stacked(_lines(row), "<br>") for row in _in_rooms(own, rooms)]
-            text.append(f"| `{agent}` | {' | '.join(found)} |")
+            name = _cell_safe(_marked(f"`{agent}`", [f"`{own}`" for own in privileged]))
+            text.append(f"| {name} | {' | '.join(found)} |")
         text.append("")
     return "\n".join(text)
 
 
-def latex(cells: pd.DataFrame, sounds: Sequence[str]) -> str:
+def latex(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str] = ()) -> str:
     """The same as one `tabular` with a `\\shortstack` in each cell."""
     rooms = list(dict.fromkeys(cells["room"]))
-    text = ["\\begin{tabular}{ll" + "c" * len(rooms) + "}", "\\hline"]
-    text.append(" & ".join(["Sound", "Agent", *map(readable, rooms)]) + " \\\\ \\hline")
+    text = [f"% success rate / SPL in %: {_settings(cells)}"]
+    text += ["\\begin{tabular}{ll" + "c" * len(rooms) + "}", "\\hline"]
+    heads = ["Sound", "Agent", *(_escaped(readable(room)) for room in rooms)]
+    text.append(" & ".join(heads) + " \\\\ \\hline")
     for sound, part in _by_sound(cells, sounds):
         for agent, own in part.groupby("agent", sort=False):
-            stacks = [_stacked(_lines(row), " \\\\ ") for row in _in_rooms(own, rooms)]
+            # braces keep LaTeX from reading the bracket of an interval as a length
+            stacks = [_stacked(_lines(row), " \\\\{} ") for row in _in_rooms(own, rooms)]
             found = ["\\shortstack{" + stack.replace("±", "$\\pm$") + "}" for stack in stacks]
-            text.append(" & ".join([_escaped(sound), _escaped(str(agent)), *found]) + " \\\\")
+            name = _escaped(_marked(str(agent), privileged))
+            text.append(" & ".join([_escaped(sound), name, *found]) + " \\\\")
         text.append("\\hline")
     return "\n".join([*text, "\\end{tabular}", ""])
+
+
+def _settings(cells: pd.DataFrame) -> str:
+    """Protocol, acoustics and ways of looking of a table."""
+    return ", ".join(
+        f"{key}={' and '.join(dict.fromkeys(map(str, cells[key])))}" for key in LABELS[1:]
+    )
+
+
+def _marked(agent: str, privileged: Collection[str]) -> str:
+    return f"{agent} (a bound)" if agent in privileged else agent
+
+
+def _cell_safe(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def _by_sound(cells: pd.DataFrame, sounds: Sequence[str]) -> list[tuple[str, pd.DataFrame]]:
@@ -124,10 +145,8 @@ def _in_rooms(part: pd.DataFrame, rooms: list[str]) -> list[dict[Hashable, Any]]
 
 def _lines(row: dict[Hashable, Any]) -> dict[str, str]:
     """What stands in one cell, line by line; empty where there is nothing to say."""
-    ends = [
-        f"{row['sr_low']:.0f}-{row['sr_high']:.0f}",
-        f"{row['spl_low']:.0f}-{row['spl_high']:.0f}",
-    ]
+    low, high = ([f"{row[f'{name}_{end}']:.0f}" for name in ("sr", "spl")] for end in ENDS)
+    ends = [one if one == other else f"{one}-{other}" for one, other in zip(low, high, strict=True)]
     return {
         OWN: _pair(row["sr"], row["spl"]),
         INTERVAL: "" if np.isnan(row["sr_low"]) else " / ".join(ends),
@@ -147,5 +166,6 @@ def _pair(sr: float, spl: float) -> str:
 
 
 def _escaped(text: str) -> str:
-    special = {c: f"\\{c}" for c in "&%$#_{}"} | {"\\": "\\textbackslash{}", "~": "\\~{}"}
+    special = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"\\{c}{{}}" for c in "~^"}
+    special["\\"] = "\\textbackslash{}"
     return "".join(special.get(c, c) for c in text)
