@@ -11,7 +11,7 @@ from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
-from avn import listening, pipeline, senses
+from avn import listening, pipeline, reinforcement, senses
 from avn.acoustics.dry_sounds import content_hash, load_sounds
 from avn.acting import acting, build_agent
 from avn.dataset import build
@@ -110,7 +110,7 @@ def evaluate(cfg: DictConfig) -> Path:
 
 def _walking_time(cfg: DictConfig) -> float:
     """Seconds that a run takes on two cores, roughly, once all that it needs is there."""
-    return 10.0 if cfg.planner._target_ else 3.0
+    return 15.0 if cfg.planner._target_ or reinforcement.learns(cfg) else 3.0
 
 
 def _walk(cfg: DictConfig, folder: Path) -> None:
