@@ -126,7 +126,7 @@ def test_a_training_that_was_killed_goes_on_as_if_it_had_not_been(flat, rules, t
 def test_two_workers_in_turn_give_the_same_bytes_every_time_and_a_round_at_a_time(
     flat, rules, tmp_path
 ):
-    options = {"workers": 2, "order": "round_robin", "total": 960, "validate_every": 480}
+    options = {"workers": 2, "total": 960, "validate_every": 480}
     task = make_task(random_tables([flat], rules), rules, **options)
     once, pieces = training(task, tmp_path / "once"), training(task, tmp_path / "pieces")
     once.run()
@@ -140,7 +140,7 @@ def test_two_workers_in_turn_give_the_same_bytes_every_time_and_a_round_at_a_tim
 
 
 def test_workers_that_run_freely_apply_all_their_gradients(flat, rules, tmp_path):
-    options = {"workers": 2, "total": 1200, "validate_every": 600}
+    options = {"workers": 2, "order": "free", "total": 1200, "validate_every": 600}
     free = training(make_task(random_tables([flat], rules), rules, **options), tmp_path / "free")
     free.run()
     assert free.steps == 1200
