@@ -13,7 +13,7 @@ from avn.learned import METRICS, Outcome, read_metrics
 
 def outcome(**changes):
     given = {"stage": "see", "what": "small", "kind": "windows", "dataset": "probabilities"}
-    given |= {"version": 1, "made_from": "ab" * 32, "title": "what is seen", "estimate": "1 s"}
+    given |= {"version": 1, "made_from": "ab" * 32, "title": "what is seen", "seconds": 1.0}
     return Outcome(**{**given, **changes})
 
 
