@@ -18,9 +18,14 @@ def plan(tmp_path):
     config.register()
     with initialize_config_dir(str(conf_folder().resolve()), version_base="1.3"):
 
-        def steps(*rows, seeds=(0,), options=()):
+        def steps(*rows, seeds=(0,), networks=(0,), options=()):
             shared = (*SMALL, *options, f"outputs={tmp_path}")
-            runs = [[f"agent={row}", f"seed={seed}", *shared] for row in rows for seed in seeds]
+            runs = [
+                [f"agent={row}", f"seed={seed}", f"train_seed={network}", *shared]
+                for row in rows
+                for seed in seeds
+                for network in networks
+            ]
             return preparation.steps([compose("eval", overrides=run) for run in runs])
 
         yield steps
@@ -63,7 +68,7 @@ def test_each_stage_is_named_once_and_before_what_needs_it(plan):
 
 def test_a_row_without_ears_needs_no_sound_and_one_without_eyes_no_views(plan):
     assert names(plan("random_walk")) == ["run of 'random_walk' (seed 0, train_seed 0)"]
-    assert not [name for name in names(plan("greedy")) if "views" in name or "windows" in name]
+    assert not [name for name in names(plan("greedy")) if "views" in name or "occupancy" in name]
     assert not [name for name in names(plan("a3c_v")) if "sound" in name]
 
 
@@ -91,4 +96,8 @@ def test_what_a_present_stage_was_made_of_is_not_asked_for(plan, tmp_path):
 def test_one_row_twice_and_one_network_for_two_train_seeds_walk_once(plan):
     twice = plan("greedy", "greedy")
     assert names(twice) == names(plan("greedy"))
-    assert len([step for step in twice if step.run is not None]) == 1
+    one = plan("greedy", networks=(0, 1), options=("sound_model.train_seed=0",))
+    for steps in (twice, one):
+        assert len([step for step in steps if step.run is not None]) == 1
+    two = plan("greedy", networks=(0, 1))
+    assert len([step for step in two if step.run is not None]) == 2

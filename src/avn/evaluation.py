@@ -58,16 +58,6 @@ def run_folder_name(cfg: DictConfig) -> str:
     return f"{cfg.agent.name}/{sounds}/seed{cfg.seed}-{run_hash(cfg)[:8]}"
 
 
-def run_folder(cfg: DictConfig) -> Path:
-    """Where the records of a run lie, or will."""
-    return Path(cfg.outputs) / "eval" / run_folder_name(cfg)
-
-
-def finished(cfg: DictConfig) -> bool:
-    """Whether a run's records are there."""
-    return (run_folder(cfg) / RESULTS).is_file()
-
-
 def evaluate(cfg: DictConfig) -> Path:
     """Walk, unless the run is there, and write `episodes.csv`, `results.csv` and TensorBoard.
 
@@ -97,7 +87,7 @@ def evaluate(cfg: DictConfig) -> Path:
             f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
         )
     load_sounds(listening.sound_files(cfg))  # a bad file is refused before anything is made
-    folder = run_folder(cfg)
+    folder = Path(cfg.outputs) / "eval" / run_folder_name(cfg)
     make_once(
         folder,
         f"run of '{cfg.agent.name}' (seed {cfg.seed}, train_seed {cfg.train_seed})",

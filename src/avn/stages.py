@@ -107,7 +107,15 @@ _only_asking = False
 
 
 def ask(make: Callable[[], object]) -> Stage:
-    """The first stage that a call would make or find, which it neither makes nor opens."""
+    """The first stage that a call would make or find, which it neither makes nor opens.
+
+    Raises
+    ------
+    UserError
+        What the call refuses before it comes to a stage.
+    ValueError
+        Where it comes to none.
+    """
     global _only_asking
     _only_asking = True
     try:

@@ -66,7 +66,7 @@ def test_stages_and_rows_fill_as_they_are_made(clock):
     assert any(line.split() == ["greedy", "-", "-"] for line in lines)
     assert any(line.split() == ["6", "stages", "9.0", "min"] for line in lines)
     assert any(line.split() == ["stage", "10", "1.7", "min", "0", "s", "..."] for line in lines)
-    assert any(line.startswith("0 more stages") for line in lines) is False
+    assert not any("more stages" in line for line in lines)
 
 
 @pytest.mark.parametrize("height", [24, 40])

@@ -70,7 +70,7 @@ def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
     for room in rooms:
         table.add_column(readable(room), justify="right", no_wrap=True)
     for agent, own in cells.groupby("agent", sort=False):
-        table.add_row(Text(_marked(str(agent), privileged), style="bold"))
+        table.add_row(Text(f"{agent}{_mark(str(agent), privileged)}", style="bold"))
         for sound, part in own.groupby("sound", sort=False):
             lines = pd.DataFrame(map(_lines, _in_rooms(part, rooms)))
             table.add_row(Text(f"  {sound}"), *lines[OWN])
@@ -93,7 +93,7 @@ def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[
         text.append("| --- " * (1 + len(rooms)) + "|")
         for agent, own in part.groupby("agent", sort=False):
             found = [_stacked(_lines(row), "<br>") for row in _in_rooms(own, rooms)]
-            name = _cell_safe(_marked(f"`{agent}`", [f"`{own}`" for own in privileged]))
+            name = _cell_safe(f"`{agent}`{_mark(str(agent), privileged)}")
             text.append(f"| {name} | {' | '.join(found)} |")
         text.append("")
     return "\n".join(text)
@@ -111,7 +111,7 @@ def latex(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str
             # braces keep LaTeX from reading the bracket of an interval as a length
             stacks = [_stacked(_lines(row), " \\\\{} ") for row in _in_rooms(own, rooms)]
             found = ["\\shortstack{" + stack.replace("±", "$\\pm$") + "}" for stack in stacks]
-            name = _escaped(_marked(str(agent), privileged))
+            name = _escaped(f"{agent}{_mark(str(agent), privileged)}")
             text.append(" & ".join([_escaped(sound), name, *found]) + " \\\\")
         text.append("\\hline")
     return "\n".join([*text, "\\end{tabular}", ""])
@@ -124,8 +124,9 @@ def _settings(cells: pd.DataFrame) -> str:
     )
 
 
-def _marked(agent: str, privileged: Collection[str]) -> str:
-    return f"{agent} (a bound)" if agent in privileged else agent
+def _mark(agent: str, privileged: Collection[str]) -> str:
+    """What stands behind the name of an agent that is no entry but a bound."""
+    return " (a bound)" if agent in privileged else ""
 
 
 def _cell_safe(text: str) -> str:
