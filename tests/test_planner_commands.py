@@ -68,6 +68,21 @@ def test_it_explores_and_finds_itself(command, outputs, localisation, exploratio
     code, out, err = ours(command, outputs, "agent=ours_exp", *options)
     assert code == 0, err
     assert len(records(out)) == 2 * 4
+    places = pd.read_csv(Path(out[-1]) / "places.csv").groupby("cells")["error_m"].mean()
+    assert places["walked"] < places["other"]
+    assert any("where views are recognised" in line for line in out)
+
+
+def test_what_its_networks_tell_it_is_judged_beside_its_records(command, outputs):
+    _, out, _ = ours(command, outputs, "agent=ours_noexp")
+    seen = pd.read_csv(Path(out[-1]) / "windows.csv")
+    room = seen[seen["cells"] == "visible"].set_index(["room", "by"])["auc"]
+    assert room["all", "network"] > 0.5
+    assert room["room_1", "prior"] == pytest.approx(room["all", "prior"])  # the only room
+    heard = pd.read_csv(Path(out[-1]) / "hearing.csv")
+    assert set(heard["acoustics"]) == {"resonance"}
+    assert not (Path(out[-1]) / "places.csv").exists()
+    assert any("which cells look free" in line for line in out)
 
 
 def test_the_truth_in_place_of_a_part_makes_a_bound_of_it(command, outputs):
@@ -85,6 +100,8 @@ def test_the_truth_in_place_of_a_part_makes_a_bound_of_it(command, outputs):
     episodes = records(out)
     assert set(episodes["agent"]) == {"ours_noexp-true-location-true-window"}
     assert episodes["success"].mean() > 0.8
+    # what was given is no network's, so that there is nothing to judge
+    assert not list(Path(out[-1]).glob("[hw]*.csv"))
 
 
 def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):

@@ -11,13 +11,12 @@ from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
-from avn import listening, pipeline, reinforcement, senses
+from avn import listening, perception_errors, pipeline, reinforcement, senses
 from avn.acoustics.dry_sounds import content_hash, load_sounds
 from avn.acting import acting, build_agent
 from avn.dataset import build
 from avn.dataset.scene import Scene
 from avn.errors import UserError
-from avn.modules.hearing import sound_errors
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
 from avn.navigation.exploration import EXPLORATIONS
 from avn.navigation.protocols import Protocol
@@ -27,7 +26,7 @@ from avn.stages import check_name, digest, make_once, written_whole
 
 # Raised when the code of simulator, agents or metrics changes a record.
 VERSION = 3
-RESULTS, EPISODE_RECORDS, HEARD = "results.csv", "episodes.csv", "hearing.csv"
+RESULTS, EPISODE_RECORDS = "results.csv", "episodes.csv"
 EPISODES = ("frozen", "exhaustive")
 
 
@@ -107,9 +106,10 @@ def _walk(cfg: DictConfig, folder: Path) -> None:
     rooms = pipeline.scenes(cfg, (cfg.part,))[cfg.part]
     wanted = wanted_by(cfg)
     hearing, sights = senses.heard(cfg, rooms, wanted), senses.seen(cfg, rooms, wanted)
-    if "sound" in wanted and listening.hears(cfg):
-        _write_heard(cfg, rooms, [own["sound"] for own in hearing], folder)
     episodes = pd.concat(walk_rooms(cfg, rooms, hearing, sights), ignore_index=True)
+    protocol: Protocol = instantiate(cfg.protocol)
+    walks = [episodes_of(cfg, room, protocol).walks for room in rooms]
+    perception_errors.write(cfg, rooms, walks, hearing, sights, folder)
     summary = results.summarise(episodes)
     _log(cfg, folder, summary)
     with written_whole(folder / "config.yaml") as part:
@@ -155,17 +155,6 @@ def walk_rooms(
     ]
 
 
-def _write_heard(
-    cfg: DictConfig, rooms: Sequence[Scene], hearing: Sequence[Tensor], folder: Path
-) -> None:
-    """How far what is heard in each room lies from the source, by sound and sight."""
-    names = tuple(listening.sound_files(cfg))
-    acoustics = pipeline.acoustics_of(cfg)
-    errors = [sound_errors(room, heard, names) for room, heard in zip(rooms, hearing, strict=True)]
-    table = pd.concat(errors, ignore_index=True).assign(acoustics=acoustics.name)
-    results.write_csv(table, folder / HEARD)
-
-
 def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
     """The episodes of a room as the config asks for them."""
     sounds = list(listening.sound_files(cfg))
@@ -196,8 +185,7 @@ def show(cfg: DictConfig, folder: Path) -> None:
     privileged = [label(cfg)] if cfg.agent.privileged else []
     runs, episodes = read(folder)
     table.print_tables(runs, episodes, privileged=privileged)
-    if (folder / HEARD).is_file():
-        table.print_heard(results.read_csv(folder / HEARD))
+    perception_errors.show(folder)
 
 
 def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:

@@ -98,34 +98,6 @@ def hardness_table(episodes: pd.DataFrame) -> Table:
     return table
 
 
-def heard_table(heard: pd.DataFrame) -> Table:
-    """What a sound network hears, by sound and sight: means over the rooms of the room medians.
-
-    Parameters
-    ----------
-    heard : DataFrame
-        As `avn.modules.hearing.sound_errors` gives it, of any number of rooms.
-    """
-    table = Table(
-        title="what is heard, medians of the rooms", box=None, pad_edge=False, title_justify="left"
-    )
-    table.add_column("", no_wrap=True)
-    for title in ("metres off", "degrees off", "over 90 degrees off"):
-        table.add_column(title, justify="right", no_wrap=True)
-    figures = ["error_m", "bearing_deg", "front_back"]
-    means = heard.groupby(["sound", "sight"], as_index=False, sort=False)[figures].mean()
-    for row in means.to_dict("records"):
-        label = f"{row['sound']}, {row['sight'].replace('_', ' ')}"
-        metres, degrees = f"{row['error_m']:.2f}", f"{row['bearing_deg']:.0f}"
-        table.add_row(label, metres, degrees, f"{100 * row['front_back']:.0f} %")
-    return table
-
-
-def print_heard(heard: pd.DataFrame, console: Console | None = None) -> None:
-    """Print what a sound network hears."""
-    (console or wide_console()).print(heard_table(heard))
-
-
 def print_tables(
     results: pd.DataFrame,
     episodes: pd.DataFrame,
