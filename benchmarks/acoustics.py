@@ -34,8 +34,7 @@ from avn.acoustics.tracer import trace
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid, source_cells
-from avn.apartments.sight import line_of_sight
-from avn.apartments.surfaces import Surfaces, build_surfaces
+from avn.apartments.surfaces import Surfaces, build_surfaces, line_of_sight
 from avn.apartments.walls import walls
 
 STEP = 0.004  # seconds, the bins of pyroomacoustics' histograms

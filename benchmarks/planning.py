@@ -18,15 +18,15 @@ import torch
 
 from avn.agents import planner_agent
 from avn.agents.planner_agent import PlannerAgent
-from avn.datamodules.sound import relative_locations
+from avn.agents.rollout import Labels, walk_room
+from avn.apartments.local_patch import window_cells
+from avn.dataset.source_locations import relative_locations
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import exhaustive_episodes
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk_room
 from avn.planning import shortest_path
 from avn.reporting.results import summarise
-from avn.views.window import window_cells
 
 VAR = Protocol("var", "box", False, "attempted", moves_factor=2.0)
 FLAT = """

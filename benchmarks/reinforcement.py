@@ -22,19 +22,19 @@ from stable_baselines3 import A2C
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
-from avn.datamodules.sound import relative_locations
+from avn.apartments.local_patch import window_cells
+from avn.dataset.source_locations import relative_locations
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
+from avn.navigation.starts import build_starts
+from avn.navigation.tables import Tables, build_tables
+from avn.navigation.world import World
 from avn.rl.a3c import Training
 from avn.rl.config import A3CConfig
 from avn.rl.environment import WalkEnv
 from avn.rl.explorations import draw_walks
 from avn.rl.networks import ActorCritic, Shape
-from avn.rl.starts import build_starts
-from avn.rl.tables import Tables, build_tables
 from avn.rl.worker import Task
-from avn.rl.world import World
-from avn.views.window import window_cells
 
 VAR = Protocol("var", "box", False, "attempted", moves_factor=2.0)
 FLAT = """

@@ -21,13 +21,13 @@ from torch import Tensor
 from avn.agents.greedy import Greedy
 from avn.agents.oracle import Oracle
 from avn.agents.random_walk import RandomWalk
-from avn.navigation.actions import BACKWARD, FORWARD, ROTATE_LEFT, ROTATE_RIGHT, transitions
+from avn.agents.rollout import Labels, walk, walk_room
+from avn.core.actions import BACKWARD, FORWARD, ROTATE_LEFT, ROTATE_RIGHT, transitions
+from avn.core.random import scramble
 from avn.navigation.distances import measure
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
-from avn.navigation.hashing import scramble
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk, walk_room
 from avn.navigation.simulator import Simulator
 from avn.reporting.results import summarise
 

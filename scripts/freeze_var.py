@@ -16,11 +16,11 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+from hardness import Hardness, hardness
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
-from avn.apartments.hardness import Hardness, hardness
 from avn.apartments.splits import FROZEN
 from avn.apartments.symmetry import layout_key, likeness
 from avn.reporting.floor_plan_figure import save_floor_plan

@@ -10,16 +10,17 @@ from torch import Tensor
 
 from avn.agents.base import Agent
 from avn.agents.planner_agent import PlannerAgent
-from avn.datamodules.sound import relative_locations
+from avn.agents.recorder import Recorder
+from avn.agents.rollout import Labels, records, walk
+from avn.apartments.local_patch import window_cells
+from avn.dataset.source_locations import relative_locations
 from avn.mapping.memory_mapper import MemoryMapper
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import frozen_episodes
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, records, walk
 from avn.navigation.simulator import Simulator
-from avn.navigation.trace import Recorder, Trace
-from avn.views.window import window_cells
+from avn.navigation.trace import Trace
 
 FLAT = """
 aaaaaaa#bbbbbbbb

@@ -19,10 +19,10 @@ SMALL = (
 )
 # The occupancy network of a row that sees.
 EYES = (
-    "mapper.network.epochs=1",
-    "mapper.network.looks=1",
-    "mapper.network.times=1",
-    "mapper.network.validation_views=40",
+    "occupancy_model.epochs=1",
+    "occupancy_model.looks=1",
+    "occupancy_model.times=1",
+    "occupancy_model.validation_views=40",
 )
 # An actor-critic row that has learnt nothing.
 A3C = (

@@ -9,7 +9,7 @@ from torch import Tensor
 from avn.acoustics.clips import DrySounds
 from avn.apartments.floor_plan import Doorway, FloorPlan, Room
 from avn.apartments.grid import Grid, build_grid, source_cells
-from avn.datamodules.sound import relative_locations
+from avn.dataset.source_locations import relative_locations
 
 
 class FreeFieldBrirs:

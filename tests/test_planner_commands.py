@@ -24,10 +24,10 @@ SMALL = (
     "sound=alarm",
 )
 EYES = (
-    "mapper.network.epochs=1",
-    "mapper.network.looks=1",
-    "mapper.network.times=1",
-    "mapper.network.validation_views=40",
+    "occupancy_model.epochs=1",
+    "occupancy_model.looks=1",
+    "occupancy_model.times=1",
+    "occupancy_model.validation_views=40",
 )
 
 

@@ -5,7 +5,7 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
-from avn.navigation.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT
+from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT
 
 
 class RightHand(Agent):

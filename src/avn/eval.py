@@ -7,17 +7,18 @@ from pathlib import Path
 
 from omegaconf import DictConfig
 
-from avn import evaluation, films
-from avn.cli import command
-from avn.stages import tell
+from avn.config.cli import command
+from avn.core.progress import tell
+from avn.pipeline import films
+from avn.pipeline.run import evaluate, show_run
 
 
 @command("eval")
 def main(cfg: DictConfig) -> Path:
     """Evaluate one row, or open its finished run, and print the table."""
     films.check(cfg)
-    folder = evaluation.evaluate(cfg)
-    evaluation.show(cfg, folder)
+    folder = evaluate(cfg)
+    show_run(cfg, folder)
     films.make_films(cfg, folder)
     tell(str(folder))
     return folder

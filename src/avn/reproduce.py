@@ -2,157 +2,23 @@
 
 from __future__ import annotations
 
-import copy
 import sys
-import time
-from collections.abc import Sequence
 from pathlib import Path
 
-import pandas as pd
-from hydra import compose
-from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
-from avn import evaluation, listening, preparation, reinforcement
-from avn.cli import command
-from avn.errors import UserError
-from avn.reporting import published, results, table
-from avn.reporting.dashboard import Dashboard
-from avn.reporting.table import PAPER_PROTOCOL
-from avn.stages import digest, refusal, span, spent, stage_folder, tell, written_whole
-
-# Overrides that belong to this command and not to a row.
-_OWN = ("rows", "seeds", "train_seeds", "sounds")
-# What it leaves beside `results.csv`.
-ACROSS, CELLS, TABLE, LATEX, SECONDS = (
-    "across_seeds.csv",
-    "cells.csv",
-    "table.md",
-    "table.tex",
-    "seconds.csv",
-)
+from avn.config.cli import command
+from avn.config.rows import compose_row
+from avn.core.progress import tell
+from avn.pipeline.reproduction import reproduce
 
 
 @command("reproduce")
 def main(cfg: DictConfig) -> Path:
     """Make what is missing, run each row with each seed, and print the whole table."""
-    for key in ("rows", "seeds", "train_seeds"):
-        if not cfg[key]:
-            raise UserError(f"{key}: empty; give at least one, such as rows=greedy seeds=0")
-    configs = [own for row in dict.fromkeys(cfg.rows) for own in _runs(cfg, row)]
-    folders = _walk(configs)
-    tables, episodes = zip(*map(evaluation.read, folders), strict=True)
-    runs, walked = pd.concat(tables), pd.concat(episodes)
-    privileged = {evaluation.label(own) for own in configs if own.agent.privileged}
-    cells = published.published(runs, walked)
-    for shown in (published.terminal(cells, privileged), table.hardness_table(episodes[0])):
-        table.wide_console().print(shown)
-    target = stage_folder(cfg.outputs, "reproduce", "table", digest([f.name for f in folders]))
-    _write(target, runs, cells, list(listening.sound_files(configs[0])), privileged)
-    _compare(walked)
-    tell(str(target))
-    return target
-
-
-def _walk(configs: Sequence[DictConfig]) -> list[Path]:
-    """Make what is missing and let all runs walk; tell the plan before, and each row at its end."""
-    steps = preparation.steps(configs)
-    missing = [step for step in steps if step.stage.missing]
-    for step in missing:
-        if step.run is None and not configs[0].auto:
-            raise refusal(step.stage.folder, step.stage.what)
-        tell(f"to make: {step.stage.what} (about {span(step.stage.seconds)})")
-    if missing:
-        tell(f"all in all about {span(sum(step.stage.seconds for step in missing))}")
-    left = [step.run.agent.name for step in steps if step.run is not None]
-    walked: dict[str, list[Path]] = {row: [] for row in left}
-    paper = published.paper_averages() if configs[0].protocol.name == PAPER_PROTOCOL else {}
-    started = time.monotonic()
-    with Dashboard([step.stage for step in missing], list(walked), paper) as board:
-        for step in steps:
-            if step.stage.missing:
-                step.make()
-                board.made()
-            if step.run is None:
-                continue
-            row = left.pop(0)
-            walked[row].append(step.stage.folder)
-            board.fill(row, _average(walked[row]))
-            if row not in left:
-                passed = span(time.monotonic() - started)
-                tell(f"{row}: {_average(walked[row])} after {passed}")
-    return [folder for own in walked.values() for folder in own]
-
-
-def _average(folders: Sequence[Path]) -> str:
-    """Success rate and SPL of some runs, over all sounds and rooms."""
-    runs = pd.concat([evaluation.read(folder)[0] for folder in folders])
-    average = runs[runs["room"] == results.AVERAGE]
-    every = average[average["sound"] == results.ALL_SOUNDS]
-    mean = 100.0 * (every if len(every) else average)[["sr", "spl"]].mean()
-    return f"{mean['sr']:.1f} / {mean['spl']:.1f}"
-
-
-def _runs(cfg: DictConfig, row: str) -> list[DictConfig]:
-    """The configs of a row: each seed, and each network where something in it is trained."""
-    shared = [o for o in HydraConfig.get().overrides.task if o.split("=")[0] not in _OWN]
-    composed = _composed([*shared, f"agent={row}"], cfg.sounds)
-    trained = listening.hears(composed) or reinforcement.learns(composed)
-    runs = []
-    networks = list(dict.fromkeys(cfg.train_seeds))
-    for seed in dict.fromkeys(cfg.seeds):
-        for train_seed in networks if trained else networks[:1]:
-            own = copy.deepcopy(composed)  # composing takes Hydra a while
-            own.seed, own.train_seed = seed, train_seed
-            runs.append(own)
-    return runs
-
-
-def _composed(overrides: list[str], sounds: Sequence[str]) -> DictConfig:
-    """The config of one run, with some of its sounds where any are named."""
-    own = compose("eval", overrides=overrides)
-    for name in sounds:
-        if name not in own.sound:
-            raise UserError(f"sounds: '{name}' is none of {', '.join(own.sound)}")
-    if sounds:
-        own.sound = {name: own.sound[name] for name in sounds}
-    return own
-
-
-def _write(
-    target: Path, runs: pd.DataFrame, cells: pd.DataFrame, sounds: list[str], privileged: set[str]
-) -> None:
-    """Leave the table as CSV, Markdown and LaTeX, and where the time went."""
-    results.write_csv(runs, target / evaluation.RESULTS)
-    results.write_csv(results.across_seeds(runs), target / ACROSS)
-    results.write_csv(cells, target / CELLS)
-    for name, text in (
-        (TABLE, published.markdown(cells, sounds, privileged)),
-        (LATEX, published.latex(cells, sounds, privileged)),
-    ):
-        with written_whole(target / name) as part:
-            part.write_text(text, encoding="utf-8")
-    seconds = pd.DataFrame({"stage": list(spent), "seconds": list(spent.values())})
-    if len(seconds):  # a table that was all there already says nothing new
-        seconds = seconds.sort_values("seconds", ascending=False).round(1)
-        results.write_csv(seconds, target / SECONDS)
-        for row in seconds.itertuples():
-            tell(f"{row.seconds:7.0f} s  {row.stage}")
-
-
-def _compare(episodes: pd.DataFrame) -> None:
-    """Print how much better each row is than the one before it, over the same episodes."""
-    rows = list(dict.fromkeys(episodes["agent"]))
-    figures = [*results.FIGURES.values()]
-    keys = ["agent", "sound", "room", "seed", "episode", "source", "start_cell", "start_heading"]
-    mean = episodes.groupby(keys, as_index=False)[figures].mean()  # over networks
-    for one, other in zip(rows[1:], rows, strict=False):
-        differences = results.compare(mean[mean["agent"] == one], mean[mean["agent"] == other])
-        spl = differences.set_index("figure").loc["spl"] * 100
-        tell(
-            f"{one} less {other}: SPL {spl['difference']:+.1f} points "
-            f"(95 % interval {spl['low']:+.1f} to {spl['high']:+.1f})"
-        )
+    folder = reproduce(cfg, [compose_row(cfg, row) for row in dict.fromkeys(cfg.rows)])
+    tell(str(folder))
+    return folder
 
 
 if __name__ == "__main__":

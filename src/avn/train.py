@@ -9,21 +9,21 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from avn import learned, listening, reinforcement, seeing
-from avn.cli import command
-from avn.errors import UserError
-from avn.stages import tell
+from avn.config.cli import command
+from avn.core.errors import UserError
+from avn.core.progress import tell
+from avn.pipeline import audio_inference, occupancy, policy, sound_network, stop_classifier, trained
 
 # What opens or trains each model, and how the figures begin that are printed, over all
 # sounds.
 MODELS: dict[str, tuple[Callable[..., tuple[Any, Path]], tuple[str, ...]]] = {
-    "sound_cnn": (listening.sound_model, ("error_m/", "bearing_deg/")),
+    "sound_cnn": (sound_network.sound_model, ("error_m/", "bearing_deg/")),
     "stop_classifier": (
-        listening.stop_model,
+        stop_classifier.stop_model,
         ("auc/validation", "ece/validation", "threshold/", "miss/", "false_"),
     ),
-    "a3c": (reinforcement.policy, ("best/", "untrained/", "seconds", "steps")),
-    "occupancy_cnn": (seeing.occupancy_model, ("accuracy/", "auc/", "ece/", "loss/")),
+    "a3c": (policy.policy, ("best/", "untrained/", "seconds", "steps")),
+    "occupancy_cnn": (occupancy.occupancy_model, ("accuracy/", "auc/", "ece/", "loss/")),
 }
 
 
@@ -34,9 +34,9 @@ def main(cfg: DictConfig) -> Path:
         raise UserError(f"model.name: '{cfg.model.name}' is none of {', '.join(MODELS)}")
     open_model, begin = MODELS[cfg.model.name]
     _, folder = open_model(cfg, asked=True)
-    metrics = learned.read_metrics(folder)
+    metrics = trained.read_metrics(folder)
     for name in sorted(metrics):
-        if name.startswith(begin) and name.split("/")[-1] not in listening.TRAINING_SOUNDS:
+        if name.startswith(begin) and name.split("/")[-1] not in audio_inference.TRAINING_SOUNDS:
             tell(f"{name}: {metrics[name]:.3g}")
     tell(str(folder))
     return folder

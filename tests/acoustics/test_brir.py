@@ -23,7 +23,7 @@ from avn.acoustics.tracer import Events, trace
 from avn.apartments.floor_plan import Doorway, FloorPlan, Room
 from avn.apartments.surfaces import Surfaces, build_surfaces, shoebox
 from avn.apartments.walls import walls
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 CONFIG = AcousticsConfig(seconds=0.3, rays=2000)
 DIFFRACTION = dataclasses.replace(CONFIG, name="diffraction", first_arrival="round_corners")

@@ -16,7 +16,7 @@ from avn.acoustics.clips import (
     export_wav,
 )
 from avn.acoustics.dry_sounds import BUILTIN, load_sounds
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 QUIET = MicrophoneConfig(noise_rms=0.0)
 

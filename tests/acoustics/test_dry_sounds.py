@@ -8,7 +8,7 @@ import pytest
 import soundfile
 
 from avn.acoustics.dry_sounds import BUILTIN, RATE, content_hash, load_sounds, read_sound
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 
 def tone(frequency: float, seconds: float, rate: int) -> np.ndarray:

@@ -6,19 +6,14 @@ from scipy.stats import spearmanr
 from avn.acoustics.ambisonics import sh
 from avn.acoustics.brir import AcousticsConfig, combine, render_first_arrivals, render_source
 from avn.acoustics.corners import paths_round_corners, sees
-from avn.acoustics.first_arrival import (
-    FirstArrivals,
-    band_energies,
-    find_paths,
-    screen_loss,
-)
+from avn.acoustics.first_arrival import FirstArrivals, band_energies, find_paths, screen_loss
 from avn.acoustics.hrtf import load_sh_hrirs
 from avn.acoustics.materials import SPEED_OF_SOUND
 from avn.apartments.floor_plan import Doorway, FloorPlan, Room
 from avn.apartments.grid import build_grid
 from avn.apartments.surfaces import build_surfaces
 from avn.apartments.walls import walls
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 RESONANCE = AcousticsConfig()
 DIFFRACTION = AcousticsConfig(name="diffraction", first_arrival="round_corners")

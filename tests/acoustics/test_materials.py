@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from avn.acoustics import materials
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 
 def test_every_name_has_coefficients_that_are_shares() -> None:

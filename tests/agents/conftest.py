@@ -1,9 +1,12 @@
 """A hand-drawn apartment and the three protocols."""
 
 import pytest
+from small_places import corridor, protocols, two_rooms
 
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
+
+__all__ = ["corridor", "flat", "hall", "protocol", "protocols", "two_rooms"]
 
 THREE_ROOMS = """
 aaaaa#bbbbbbb

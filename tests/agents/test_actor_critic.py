@@ -5,11 +5,11 @@ import pytest
 import torch
 
 from avn.agents.actor_critic import ActorCriticAgent
-from avn.errors import UserError
+from avn.agents.rollout import Labels, walk, walk_room
+from avn.core.errors import UserError
 from avn.navigation.episodes import frozen_episodes
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk, walk_room
 from avn.navigation.simulator import Simulator
 from avn.rl.networks import ActorCritic, Shape
 

@@ -5,11 +5,11 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.greedy import Greedy
-from avn.errors import UserError
+from avn.agents.rollout import Labels, walk_room
+from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes
 from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk_room
 
 FORWARD, BACKWARD, LEFT, RIGHT, STOP = range(5)
 LABELS = Labels("greedy", "resonance")

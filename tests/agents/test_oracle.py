@@ -1,10 +1,10 @@
 import dataclasses
 
 from avn.agents.oracle import Oracle
+from avn.agents.rollout import Labels, walk_room
 from avn.navigation.episodes import exhaustive_episodes
 from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk_room
 
 LABELS = Labels("oracle", "resonance")
 

@@ -7,15 +7,15 @@ import torch
 from torch import Tensor
 
 from avn.agents.planner_agent import PlannerAgent
-from avn.datamodules.sound import relative_locations
-from avn.errors import UserError
+from avn.agents.rollout import Labels, walk_room
+from avn.apartments.local_patch import window_cells
+from avn.core.errors import UserError
+from avn.dataset.source_locations import relative_locations
 from avn.mapping.memory_mapper import MemoryMapper
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk_room
-from avn.views.window import window_cells
 
 # Two rooms, a wall between them with one doorway, and a dead end on the straight way.
 FLAT = """

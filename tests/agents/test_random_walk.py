@@ -3,10 +3,10 @@ import torch
 from tensordict import TensorDict
 
 from avn.agents.random_walk import RandomWalk
+from avn.agents.rollout import Labels, walk_room
 from avn.navigation.episodes import exhaustive_episodes
 from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk_room
 
 NOTHING = TensorDict({}, batch_size=[10_000])
 

@@ -10,7 +10,7 @@ import pytest
 
 from avn.apartments.floor_plan import FloorPlan, Piece, load
 from avn.apartments.generator import generate
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 
 @pytest.fixture(scope="module")

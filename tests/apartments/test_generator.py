@@ -14,7 +14,7 @@ from avn.apartments.generator import SIZES, generate
 from avn.apartments.grid import Grid, build_grid
 from avn.apartments.splits import SplitConfig, load_split
 from avn.apartments.symmetry import layout_key
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 SEEDS = range(12)
 EVERYWHERE = {"front_door", "bookshelf", "plant", "chair", "desk"}

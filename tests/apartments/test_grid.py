@@ -11,7 +11,7 @@ import pytest
 from avn.apartments.floor_plan import Doorway, FloorPlan, Piece, Room
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid, goal_cells, source_cells
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 FINISH = {"floor": "parquet", "walls": "plaster", "ceiling": "ceiling_plaster"}
 

@@ -12,7 +12,7 @@ from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid
 from avn.apartments.splits import FROZEN, SplitConfig, load_split
 from avn.apartments.symmetry import layout_key
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 CONF = Path(__file__).parents[2] / "conf" / "split"
 SOUNDS = 3

@@ -3,9 +3,9 @@ import torch
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
 from avn.acoustics.clips import MicrophoneConfig
-from avn.datamodules.fresh_takes import FreshTakes
-from avn.datamodules.sound import ClipSet, SoundData, relative_locations
-from avn.errors import UserError
+from avn.core.errors import UserError
+from avn.datamodules.sound import ClipSet, FreshTakes, SoundData
+from avn.dataset.source_locations import relative_locations
 from avn.modules.sound_cnn import SoundModelConfig
 
 

@@ -5,8 +5,8 @@ from synthetic_scene import synthetic_scene, synthetic_sounds
 
 from avn.acoustics.clips import MicrophoneConfig
 from avn.apartments.grid import goal_cells
+from avn.core.errors import UserError
 from avn.datamodules.stop import GoalOften, StopData, moves_to_goal
-from avn.errors import UserError
 from avn.modules.stop_classifier import StopModelConfig
 
 

@@ -3,8 +3,8 @@ import pytest
 import torch
 from synthetic_views import synthetic_views
 
+from avn.core.errors import UserError
 from avn.datamodules.views import COARSE, FreshViews, ViewData, ViewSet
-from avn.errors import UserError
 from avn.modules.occupancy_cnn import OccupancyConfig
 from avn.modules.view_augment import AugmentConfig
 

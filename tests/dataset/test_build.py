@@ -9,8 +9,8 @@ from avn.acoustics.brir import AcousticsConfig
 from avn.apartments.generator import generate
 from avn.apartments.surfaces import build_surfaces
 from avn.apartments.walls import walls
+from avn.core.errors import UserError
 from avn.dataset import build, scene
-from avn.errors import UserError
 
 FEW = AcousticsConfig(rays=200, seconds=0.1)
 ROUND = AcousticsConfig(name="diffraction", first_arrival="round_corners", rays=200, seconds=0.1)

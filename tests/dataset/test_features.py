@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from avn.core.errors import UserError
 from avn.dataset.features import features_file, read_features, write_features
-from avn.errors import UserError
 
 FEATURES = np.random.default_rng(0).normal(size=(8, 5)).astype(np.float32)
 

@@ -2,8 +2,8 @@ import h5py
 import numpy as np
 import pytest
 
+from avn.core.errors import UserError
 from avn.dataset import scene_file
-from avn.errors import UserError
 
 DATA = np.arange(1000, dtype=np.int16)
 

@@ -5,9 +5,9 @@ import pytest
 
 from avn.acoustics.brir import AcousticsConfig
 from avn.apartments.generator import generate
+from avn.core.errors import UserError
 from avn.dataset import build, build_views
 from avn.dataset.views import views_file
-from avn.errors import UserError
 from avn.views.camera import CameraConfig
 from avn.views.lighting import LightConfig
 from avn.views.raycast import Raycast, RaycastConfig

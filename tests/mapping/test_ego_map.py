@@ -1,7 +1,7 @@
 import torch
 
+from avn.core.pose import turned
 from avn.mapping.ego_map import around, offsets
-from avn.mapping.pose import turned
 
 
 def test_the_part_around_an_agent_is_that_of_a_map_turned_to_its_heading():

@@ -1,7 +1,7 @@
 import torch
 
+from avn.core.pose import turned
 from avn.mapping.frames import FrameVotes, turned_walls
-from avn.mapping.pose import turned
 
 
 def test_an_equal_picture_tells_where_the_walk_lies() -> None:

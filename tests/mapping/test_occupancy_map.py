@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import torch
 
-from avn.errors import UserError
+from avn.core.errors import UserError
+from avn.core.pose import turned
 from avn.mapping.occupancy_map import OccupancyMap
-from avn.mapping.pose import turned
 
 NORTH, EAST, SOUTH, WEST = range(4)
 

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 
 

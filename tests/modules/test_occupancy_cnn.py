@@ -9,8 +9,8 @@ from omegaconf import OmegaConf
 from synthetic_views import synthetic_views
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from avn.core.errors import UserError
 from avn.datamodules.views import ViewData
-from avn.errors import UserError
 from avn.modules.occupancy_cnn import OccupancyCnn, OccupancyConfig
 from avn.modules.training import BEST, LAST, fit, load_weights
 from avn.modules.view_augment import AugmentConfig
@@ -110,7 +110,7 @@ def test_resumed_training_is_the_uninterrupted_one(
 def test_checkpoint_of_another_config_is_one_line(
     run: tuple[Path, OccupancyCnn, dict[str, Any]],
 ) -> None:
-    message = r"best.ckpt: .*another config \(mapper.network.net.cell is 16 there, 8 here\)"
+    message = r"best.ckpt: .*another config \(occupancy_model.net.cell is 16 there, 8 here\)"
     other = recipe()
     other.net.cell = 8
     with pytest.raises(UserError, match=message):

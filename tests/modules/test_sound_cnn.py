@@ -7,14 +7,10 @@ from hydra.errors import InstantiationException
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.modules.five_layer_cnn import FiveLayerCnn
 from avn.modules.listener import PictureBatch
-from avn.modules.sound_cnn import (
-    SoundCnn,
-    SoundModelConfig,
-    no_sound_model,
-)
+from avn.modules.sound_cnn import SoundCnn, SoundModelConfig, no_sound_model
 
 CONF = Path(__file__).parents[2] / "conf" / "sound_model"
 

@@ -3,7 +3,7 @@ import math
 import pytest
 import torch
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.modules.spectrogram import Spectrogram, band_weights
 
 

@@ -9,11 +9,11 @@ from synthetic_scene import synthetic_scene, synthetic_sounds
 
 from avn.acoustics.clips import MicrophoneConfig
 from avn.apartments.grid import goal_cells
+from avn.core.errors import UserError
 from avn.datamodules.stop import StopData
-from avn.errors import UserError
-from avn.modules.hearing import hear
 from avn.modules.stop_classifier import StopClassifier, StopModelConfig
 from avn.modules.training import BEST, fit, load_weights
+from avn.pipeline.audio_inference import hear
 
 CONF = Path(__file__).parents[2] / "conf" / "stop_model"
 

@@ -10,8 +10,8 @@ from synthetic_scene import synthetic_scene, synthetic_sounds
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from avn.acoustics.clips import MicrophoneConfig
+from avn.core.errors import UserError
 from avn.datamodules.sound import SoundData
-from avn.errors import UserError
 from avn.modules.sound_cnn import SoundCnn, SoundModelConfig
 from avn.modules.training import BEST, LAST, fit, load_weights
 

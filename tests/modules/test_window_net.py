@@ -3,10 +3,10 @@ import pytest
 import torch
 
 from avn.apartments.floor_plan import CELL
-from avn.errors import UserError
+from avn.apartments.local_patch import window_offsets
+from avn.core.errors import UserError
 from avn.modules.window_net import PROBES, WindowNet, probe_places
 from avn.views.camera import CameraConfig, ray_directions
-from avn.views.window import window_offsets
 
 
 def test_probes_lie_in_the_pixels_whose_rays_meet_them() -> None:

@@ -1,35 +1,6 @@
-"""Small apartments and the three protocols, drawn by hand."""
+"""The small apartments that the tests of this folder walk through."""
 
-import pytest
+from small_places import corridor, protocols, two_rooms
+from small_worlds import flat, rules
 
-from avn.navigation.place import DrawnPlace, draw
-from avn.navigation.protocols import Protocol
-
-# Two rooms with a doorway (the `a` in the wall), and a source in each.
-TWO_ROOMS = """
-aaaaa#bbbbb
-aAaaa#bbbbb
-aaaaaabbbBb
-aaaaa#bbbbb
-aaaaa#bbbbb
-"""
-
-
-@pytest.fixture
-def two_rooms() -> DrawnPlace:
-    return draw("two_rooms", TWO_ROOMS)
-
-
-@pytest.fixture
-def corridor() -> DrawnPlace:
-    """Eleven cells from west to east, the source on the first."""
-    return draw("corridor", "A" + 10 * "a")
-
-
-@pytest.fixture
-def protocols() -> dict[str, Protocol]:
-    return {
-        "var": Protocol("var", "box", False, "attempted", moves_factor=2.0, exploration=0),
-        "var_stop": Protocol("var_stop", "box", True, "attempted", moves_factor=2.0, exploration=0),
-        "stop": Protocol("stop", "radius", True, "walked", exploration=0),
-    }
+__all__ = ["corridor", "flat", "protocols", "rules", "two_rooms"]

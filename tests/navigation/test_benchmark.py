@@ -7,11 +7,11 @@ import pytest
 from avn.acoustics.brir import AcousticsConfig
 from avn.agents.oracle import Oracle
 from avn.agents.random_walk import RandomWalk
+from avn.agents.rollout import Labels, walk_room
 from avn.apartments.splits import SplitConfig, load_split
 from avn.dataset.build import build_geometry
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
 from avn.navigation.protocols import Protocol
-from avn.navigation.run import Labels, walk_room
 from avn.reporting.results import headline, summarise
 
 PROTOCOLS = {

@@ -1,7 +1,7 @@
 import networkx as nx
 import numpy as np
 
-from avn.navigation.actions import MOVES, STOP, transitions
+from avn.core.actions import MOVES, STOP, transitions
 from avn.navigation.distances import UNREACHABLE, fewest_actions, measure
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from avn.navigation.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT, transitions
+from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT, transitions
+from avn.core.random import derive, scramble
 from avn.navigation.exploration import explore, first_visits
-from avn.navigation.hashing import derive, scramble
 from avn.navigation.place import DrawnPlace
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.navigation.place import DrawnPlace, draw
 
 

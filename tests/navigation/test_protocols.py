@@ -3,7 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 

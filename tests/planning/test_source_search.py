@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.planning.source_search import HearingError, SourceSearch
 
 YES = np.array([True])

@@ -1,7 +1,7 @@
 import pandas as pd
 import pytest
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.reporting.breakdown import breakdown, breakdown_figure
 
 

@@ -8,9 +8,9 @@ import pytest
 from drawn_walks import clips, ours, views, walked
 
 from avn.agents.random_walk import RandomWalk
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.navigation.trace import Trace
-from avn.perceived import soundtrack
+from avn.pipeline.observed import soundtrack
 from avn.reporting.film import FPS, SIZE, write_film
 
 

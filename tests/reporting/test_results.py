@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.reporting.results import (
     EPISODE_COLUMNS,
     RESULT_COLUMNS,

@@ -5,7 +5,7 @@ import numpy as np
 import torch
 from synthetic_scene import synthetic_scene
 
-from avn.datamodules.sound import relative_locations
+from avn.dataset.source_locations import relative_locations
 from avn.reporting.sound_figures import location_figure, spectrogram_figure, stereo, to_world
 
 

@@ -4,10 +4,10 @@ import time
 
 import pytest
 import torch
-from rl.conftest import make_task, make_walks, make_worker, random_tables
+from small_worlds import make_task, make_walks, make_worker, random_tables
 from torch.nn import functional as F
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.rl import a3c, crew
 from avn.rl.a3c import BEST, LAST, Training, load_network, read_checkpoint
 from avn.rl.networks import ActorCritic, sample

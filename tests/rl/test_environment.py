@@ -1,16 +1,16 @@
 import pytest
 import torch
-from rl.conftest import make_task, make_walks, make_worker, random_tables
+from small_worlds import make_task, make_walks, make_worker, random_tables
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import check_env_specs
 
-from avn.errors import UserError
+from avn.core.errors import UserError
+from avn.navigation.starts import build_starts
+from avn.navigation.world import World
 from avn.rl.collectors import LeanCollector, TorchrlCollector
 from avn.rl.environment import WalkEnv
 from avn.rl.policy import Policy, Resolving
-from avn.rl.starts import build_starts
-from avn.rl.world import World
 
 ALL = ("feature", "sound_feature", "collided", "odometry", "map")
 

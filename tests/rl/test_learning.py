@@ -1,14 +1,14 @@
 """A3C learns what there is to learn: the shortest way, and to remember."""
 
 import torch
-from rl.conftest import make_task, make_worker
+from small_worlds import make_task, make_worker
 
 from avn.navigation.distances import fewest_actions
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
-from avn.rl.config import RewardConfig
-from avn.rl.starts import Starts
-from avn.rl.tables import build_tables
+from avn.navigation.reward import RewardConfig
+from avn.navigation.starts import Starts
+from avn.navigation.tables import build_tables
 
 RULES = Protocol("var", "box", False, "attempted", moves_factor=2.0)
 LEARN = {"episodes": 16, "steps": 10, "lr": 3e-3, "eps": 1e-5, "schedule": "constant", "width": 32}

@@ -1,6 +1,6 @@
 import pytest
 import torch
-from rl.conftest import make_task, make_worker, random_tables
+from small_worlds import make_task, make_worker, random_tables
 from torch.nn import functional as F
 
 from avn.rl.losses import ActorCriticLoss

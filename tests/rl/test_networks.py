@@ -1,5 +1,5 @@
 import torch
-from rl.conftest import make_task, make_walks, make_worker, random_tables
+from small_worlds import make_task, make_walks, make_worker, random_tables
 from tensordict import TensorDict
 from torchrl.modules import set_recurrent_mode
 

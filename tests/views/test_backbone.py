@@ -10,7 +10,7 @@ import pytest
 import torch
 import yaml
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.views import backbone as module
 from avn.views.backbone import (
     Backbone,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.views.camera import CameraConfig, ray_directions
 
 FORWARD = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])

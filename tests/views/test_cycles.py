@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from avn.apartments.floor_plan import FloorPlan, Lamp, Room, Window
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.views.camera import CameraConfig
 from avn.views.cycles import Cycles, CyclesConfig
 from avn.views.lighting import LightConfig

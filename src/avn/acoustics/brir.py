@@ -18,7 +18,7 @@ from avn.acoustics.hrtf import load_sh_hrirs
 from avn.acoustics.rendering import Binaural, binaural_responses
 from avn.acoustics.tracer import Events, trace
 from avn.apartments.surfaces import Surfaces
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 
 @dataclass

@@ -23,8 +23,8 @@ from torch.nn.functional import pad
 
 from avn.acoustics.counter_hash import absorb, integers
 from avn.acoustics.dry_sounds import RATE
-from avn.errors import UserError
-from avn.stages import written_whole
+from avn.core.errors import UserError
+from avn.core.files import written_whole
 
 CLIP_SAMPLES = RATE
 PURPOSES = ("train", "eval")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.signal import resample_poly
 
 from avn.acoustics.audio_files import missing_part
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 RATE = 16000
 BUILTIN = ("ring", "alarm", "clock")

@@ -23,7 +23,7 @@ from avn.acoustics.band_filters import minimum_phase
 from avn.acoustics.corners import Paths, paths_round_corners, straight_paths
 from avn.acoustics.materials import BANDS, SPEED_OF_SOUND
 from avn.acoustics.rendering import to_int16
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 LOSS_TAPS = 128
 REGIMES = ("through_walls", "round_corners")

@@ -26,7 +26,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 BANDS = (125, 250, 500, 1000, 2000, 4000)
 SPEED_OF_SOUND = 343.0  # m/s, at 20 degrees

@@ -10,7 +10,7 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent, BaselineConfig
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.mapping.ego_map import WIDTH, EgoMap, around, offsets
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.navigation.protocols import Protocol

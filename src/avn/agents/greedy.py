@@ -10,8 +10,8 @@ from torch import Tensor
 
 from avn.agents.base import Agent, BaselineConfig
 from avn.apartments.floor_plan import CELL
-from avn.errors import UserError
-from avn.navigation.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT, STOP
+from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT, STOP
+from avn.core.errors import UserError
 from avn.navigation.protocols import Protocol
 
 

@@ -7,7 +7,7 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
-from avn.navigation.actions import HEADINGS, MOVES, STOP
+from avn.core.actions import HEADINGS, MOVES, STOP
 from avn.navigation.distances import fewest_actions
 from avn.navigation.simulator import Simulator
 

@@ -13,10 +13,10 @@ from torch import Tensor
 
 from avn.agents.base import Agent
 from avn.apartments.floor_plan import CELL
-from avn.errors import UserError
+from avn.core.actions import BACKWARD, FORWARD, HEADINGS, ROTATE_RIGHT, STOP
+from avn.core.errors import UserError
+from avn.core.pose import turned
 from avn.mapping.base import Mapper
-from avn.mapping.pose import turned
-from avn.navigation.actions import BACKWARD, FORWARD, HEADINGS, ROTATE_RIGHT, STOP
 from avn.navigation.protocols import Protocol
 from avn.planning.partial_graph import GraphRules
 from avn.planning.shortest_path import NO_ACTION, first_actions

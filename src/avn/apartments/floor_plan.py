@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avn.apartments.plan_checks import check, number, part
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 CELL = 0.5
 WALL_THICKNESS = 0.1
@@ -23,6 +23,7 @@ DOOR_HEIGHT = 2.05
 CEILING = 2.6
 ROOM_KINDS = ("kitchen", "bedroom", "living_room", "bathroom")
 FORMAT_VERSION = 1
+FARTHEST = 1000.0  # metres
 
 
 @dataclass(frozen=True)
@@ -156,17 +157,17 @@ def from_dict(data: dict[str, Any], origin: str = "floor plan") -> FloorPlan:
         if not isinstance(data[key], list | tuple):
             raise UserError(f"{origin}: '{key}' is no list; see docs/dataset.md")
     for place in data["sources"]:
-        if not isinstance(place, list | tuple) or [number(v) for v in place] != [True, True]:
+        if not isinstance(place, list | tuple) or [_number(v) for v in place] != [True, True]:
             raise UserError(f"{origin}: a source is {place!r}, not [x, y] in metres")
     plan = FloorPlan(
         name=str(data["name"]),
         sources=tuple((float(x), float(y)) for x, y in data["sources"]),
         **{
-            key: tuple(part(cls, own, f"{origin}: {key}[{i}]") for i, own in enumerate(data[key]))
+            key: tuple(_part(cls, own, f"{origin}: {key}[{i}]") for i, own in enumerate(data[key]))
             for key, cls in _PARTS.items()
         },
     )
-    check(plan, origin, CELL, CEILING, ROOM_KINDS)
+    _check(plan, origin)
     return plan
 
 
@@ -179,3 +180,83 @@ def load(path: Path) -> FloorPlan:
     except ValueError as error:
         raise UserError(f"{path}: not JSON ({error}); give the path of a floor plan") from error
     return from_dict(data, str(path))
+
+
+def _part(cls: type, data: Any, where: str) -> Any:
+    """Build one part of a plan, such as a room, from what its JSON holds.
+
+    Raises
+    ------
+    UserError
+        Naming the part and the key that is missing, unknown or of another kind.
+    """
+    if not isinstance(data, dict):
+        raise UserError(f"{where}: is {data!r}, not an object with keys; see docs/dataset.md")
+    fields = {field.name: field for field in dataclasses.fields(cls)}
+    for key in data:
+        if key not in fields:
+            raise UserError(f"{where}: unknown key '{key}'; there are {', '.join(fields)}")
+    for key, field in fields.items():
+        if key not in data:
+            if field.default is dataclasses.MISSING:
+                raise UserError(f"{where}: key '{key}' is missing; see docs/dataset.md")
+            continue
+        if field.type == "str":
+            fits = isinstance(data[key], str)
+        else:
+            fits = _number(data[key]) and (field.type != "int" or int(data[key]) == data[key])
+        if not fits:
+            raise UserError(f"{where}: '{key}' is {data[key]!r}, which is no {field.type}")
+    return cls(**data)
+
+
+def _number(value: Any) -> bool:
+    """Whether it is a number of metres within reach."""
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and math.isfinite(value)
+        and abs(value) <= FARTHEST
+    )
+
+
+def _check(plan: FloorPlan, origin: str) -> None:
+    """Raise `UserError` where rooms, openings, furniture or sources cannot be."""
+
+    def on_lattice(*values: float) -> bool:
+        return all(math.isclose(v / CELL, round(v / CELL), abs_tol=1e-6) for v in values)
+
+    if not plan.rooms or not plan.sources:
+        missing = "sources" if plan.rooms else "rooms"
+        raise UserError(f"{origin}: {missing} is empty; a floor plan has at least one")
+    for room in plan.rooms:
+        if room.kind not in ROOM_KINDS:
+            raise UserError(f"{origin}: room kind '{room.kind}' is none of {', '.join(ROOM_KINDS)}")
+        if not on_lattice(room.x0, room.y0, room.x1, room.y1):
+            raise UserError(f"{origin}: walls of the {room.kind} are not on the {CELL} m lattice")
+        if room.x1 <= room.x0 or room.y1 <= room.y0:
+            raise UserError(f"{origin}: the {room.kind} has no area; x0 < x1 and y0 < y1 must hold")
+    openings: list[Doorway | Window] = [*plan.doorways, *plan.windows]
+    for opening in openings:
+        if opening.along not in ("x", "y"):
+            raise UserError(f"{origin}: 'along' is '{opening.along}', not 'x' or 'y'")
+    for door in plan.doorways:
+        if not on_lattice(door.x, door.y):
+            raise UserError(
+                f"{origin}: the doorway at ({door.x}, {door.y}) is not centred on the {CELL} m "
+                "lattice; move it"
+            )
+    for window in plan.windows:
+        if min(window.width, window.height) <= 0 or not 0 <= window.sill < CEILING:
+            raise UserError(
+                f"{origin}: the window at ({window.x}, {window.y}) does not fit under the ceiling"
+            )
+    for piece in plan.furniture:
+        if piece.heading not in (0, 1, 2, 3):
+            raise UserError(f"{origin}: heading of a {piece.kind} is {piece.heading}, not 0 to 3")
+        if min(piece.width, piece.depth, piece.height) <= 0 or piece.z < 0:
+            raise UserError(
+                f"{origin}: a {piece.kind} has no size; width, depth, height are over 0"
+            )
+    if len(set(plan.sources)) < len(plan.sources):
+        raise UserError(f"{origin}: two sources stand in one place; move one")

@@ -14,7 +14,7 @@ from avn.apartments.layout import draw_layout, outer_spans
 from avn.apartments.placement import DOOR_CLEARANCE, Furnisher, Spot, overlap
 from avn.apartments.rooms import FURNISH
 from avn.apartments.sources import spread_sources
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 LAMP_HEIGHT = 2.35
 # Draws of rooms before a seed is given up; one in some fifty is a home.

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import shortest_path
 
 from avn.apartments.floor_plan import CELL, FloorPlan
 from avn.apartments.walls import obstacles
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 BODY_RADIUS = 0.2
 # North, east, south, west in lattice steps (x, y).

@@ -10,14 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from avn.apartments.floor_plan import (
-    CELL,
-    DOOR_WIDTH,
-    WALL_THICKNESS,
-    FloorPlan,
-    Piece,
-    Room,
-)
+from avn.apartments.floor_plan import CELL, DOOR_WIDTH, WALL_THICKNESS, FloorPlan, Piece, Room
 from avn.apartments.furniture import Group, Part, Rect
 from avn.apartments.grid import free_squares
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import Grid, goal_cells
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 # Nearest that two sources stand, metres, where there is room for it.
 APART = 1.5

@@ -8,7 +8,7 @@ from pathlib import Path
 from avn.apartments.floor_plan import FloorPlan, load
 from avn.apartments.generator import SIZES, generate
 from avn.apartments.symmetry import layout_key
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 PARTS = ("train", "validation", "test")
 FROZEN = Path(__file__).parents[1] / "assets" / "floor_plans"

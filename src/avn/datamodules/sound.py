@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,11 +12,10 @@ from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
-from avn.apartments.floor_plan import CELL
-from avn.datamodules.ahead import AheadLoader
-from avn.datamodules.fresh_takes import FreshTakes
+from avn.core.errors import UserError
+from avn.core.prefetch import AheadLoader
 from avn.dataset.scene import Brirs, Scene
-from avn.errors import UserError
+from avn.dataset.source_locations import where_sources_are
 from avn.modules.listener import ClipBatch, PictureBatch
 from avn.modules.network import build_part
 from avn.modules.sound_cnn import SoundModelConfig
@@ -24,35 +23,6 @@ from avn.modules.spectrogram import Spectrogram
 
 # The clips on which networks in training are compared; the same for every `train_seed`.
 VALIDATION_SEED = 0
-
-
-def relative_locations(lattice: Tensor, sources: Tensor) -> Tensor:
-    """Where each source lies for each state.
-
-    Parameters
-    ----------
-    lattice : (C, 2) integer tensor
-        Cells, in steps of the grid to the east and to the north.
-    sources : (K,) integer tensor
-        Cells of the sources.
-
-    Returns
-    -------
-    (K, 4 C, 2) float32 tensor
-        Metres to the right and to the front of an agent in state 4 x cell + heading.
-    """
-    east, north = ((lattice[sources][:, None] - lattice[None]) * CELL).float().unbind(-1)
-    right = torch.stack((east, -north, -east, north), -1)
-    front = torch.stack((north, east, -north, -east), -1)
-    return torch.stack((right, front), -1).flatten(1, 2)
-
-
-def where_sources_are(scene: Scene) -> tuple[Tensor, Tensor]:
-    """Relative locations (K, S, 2), and whether each source is in sight (K, S), of an apartment."""
-    lattice = torch.from_numpy(scene.grid.lattice.astype("int64"))
-    sources = torch.from_numpy(scene.sources.astype("int64"))
-    in_sight = torch.from_numpy(scene.in_sight).repeat_interleave(4, dim=1)
-    return relative_locations(lattice, sources), in_sight
 
 
 @dataclass
@@ -165,6 +135,41 @@ class ClipSet(Dataset[ClipBatch]):
                 gathered = clips.brirs.gather(self.source[chosen], self.state[chosen])
                 brirs[rows, :, : clips.brirs.samples] = gathered
         return brirs
+
+
+class FreshTakes(Sampler[int]):
+    """The items of a training epoch in a random order: every pair, each time in another take.
+
+    The order is drawn from the seed and the epoch alone, so that a resumed training sees what
+    an uninterrupted one would have seen.
+
+    Parameters
+    ----------
+    clips : ClipSet
+    seed : int
+    sounds_per_pair : int
+        How many of the sounds a pair is heard with in one epoch.
+    """
+
+    def __init__(self, clips: ClipSet, seed: int, sounds_per_pair: int) -> None:
+        self.clips, self.seed, self.sounds_per_pair = clips, seed, sounds_per_pair
+        self.epoch = 0
+
+    def set_epoch(self, epoch: int) -> None:
+        """Called by the trainer before each epoch."""
+        self.epoch = epoch
+
+    def __len__(self) -> int:
+        return self.clips.pairs * self.sounds_per_pair
+
+    def __iter__(self) -> Iterator[int]:
+        generator = torch.Generator().manual_seed(self.seed * 1_000_003 + self.epoch)
+        sounds = len(self.clips.sounds.names)
+        ranks = torch.rand(self.clips.pairs, sounds, generator=generator).argsort(1)
+        chosen = ranks[:, : self.sounds_per_pair].flatten()
+        pairs = torch.arange(self.clips.pairs).repeat_interleave(self.sounds_per_pair)
+        items = self.clips.item(pairs, chosen, self.epoch)
+        yield from items[torch.randperm(len(items), generator=generator)].tolist()
 
 
 class PictureSet(Dataset[PictureBatch]):

@@ -11,9 +11,9 @@ from torch import Tensor
 from torch.utils.data import Sampler
 
 from avn.acoustics.clips import DrySounds, MicrophoneConfig
+from avn.core.errors import UserError
 from avn.datamodules.sound import ClipSet, SoundData
 from avn.dataset.scene import Scene
-from avn.errors import UserError
 from avn.modules.stop_classifier import StopModelConfig
 
 # Tells the cells of an apartment, (K, C) bool, at which each source counts as reached.

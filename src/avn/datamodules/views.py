@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
-from avn.datamodules.ahead import AheadLoader
-from avn.errors import UserError
+from avn.core.errors import UserError
+from avn.core.prefetch import AheadLoader
 from avn.modules.occupancy_cnn import OccupancyConfig, ViewBatch
 from avn.modules.view_augment import AugmentConfig, augment
 

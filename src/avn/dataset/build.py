@@ -20,15 +20,15 @@ from avn.acoustics.first_arrival import FirstArrivals
 from avn.acoustics.materials import NAMES
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid, source_cells
-from avn.apartments.sight import line_of_sight
-from avn.apartments.surfaces import build_surfaces
+from avn.apartments.surfaces import build_surfaces, line_of_sight
 from avn.apartments.walls import walls
+from avn.core.errors import UserError
+from avn.core.files import written_whole
+from avn.core.hashing import digest
+from avn.core.processes import in_processes
+from avn.core.progress import progress_bar
 from avn.dataset import scene, scene_file
-from avn.dataset.processes import in_processes
 from avn.dataset.scene import Scene
-from avn.errors import UserError
-from avn.progress import progress_bar
-from avn.stages import digest, written_whole
 
 # Raised when the code of a part changes what it makes. All enter every hash, for cells,
 # reverberation and first arrivals lie in one folder and must be of one making.

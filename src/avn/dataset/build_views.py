@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
+from avn.core.files import written_whole
+from avn.core.hashing import digest
+from avn.core.processes import in_processes
+from avn.core.progress import progress_bar
 from avn.dataset import scene_file
-from avn.dataset.processes import in_processes
 from avn.dataset.scene import Scene
 from avn.dataset.views import VERSION, views_file, views_kind
-from avn.progress import progress_bar
-from avn.stages import digest, written_whole
 from avn.views.models import assets_hash
 from avn.views.renderer import Renderer, RendererConfig, renderer_class
 

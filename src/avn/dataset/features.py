@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from avn.core.errors import UserError
 from avn.dataset import scene_file
-from avn.errors import UserError
 
 # Raised when the layout of the file changes.
 VERSION = 1

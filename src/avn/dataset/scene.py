@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan, from_dict
 from avn.apartments.grid import Grid
+from avn.core.errors import UserError
 from avn.dataset import scene_file
 from avn.dataset.views import Views, read_views
-from avn.errors import UserError
 
 # Raised when the layout of a file changes.
 GEOMETRY_VERSION = 1

@@ -16,8 +16,8 @@ from typing import Any
 
 import h5py
 
-from avn.errors import UserError
-from avn.stages import written_whole
+from avn.core.errors import UserError
+from avn.core.files import written_whole
 
 _BLOCK = 512
 _CHUNK = 1 << 24

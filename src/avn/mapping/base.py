@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from tensordict import TensorDict
 from torch import Tensor
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.planning.partial_graph import GraphRules, PartialGraph
 
 if TYPE_CHECKING:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from avn.modules.occupancy_cnn import OccupancyConfig
-
 
 @dataclass
 class MapperConfig:
@@ -16,8 +14,6 @@ class MapperConfig:
     name : str
     size : int
         Squares along each side of the map.
-    network : OccupancyConfig, optional
-        What sees which squares are free, with the recipe that trains it.
     visible_above : float
         Squares that are visible by less than this tell nothing of being free.
     """
@@ -25,7 +21,6 @@ class MapperConfig:
     _target_: str | None = None
     name: str = "none"
     size: int = 101
-    network: OccupancyConfig | None = None
     visible_above: float = 0.0
 
 

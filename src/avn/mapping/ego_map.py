@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from tensordict import TensorDict
 from torch import Tensor
 
-from avn.errors import UserError
+from avn.core.actions import BACKWARD, HEADINGS
+from avn.core.errors import UserError
+from avn.core.pose import turned
 from avn.mapping.occupancy_map import OccupancyMap
 from avn.mapping.occupancy_mapper import take_in
-from avn.mapping.pose import turned
-from avn.navigation.actions import BACKWARD, HEADINGS
 
 WIDTH = 21
 

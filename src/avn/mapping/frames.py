@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from avn.mapping.pose import turned
-from avn.navigation.actions import HEADINGS
+from avn.core.actions import HEADINGS
+from avn.core.pose import turned
 
 
 class FrameVotes:

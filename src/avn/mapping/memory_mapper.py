@@ -8,14 +8,14 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
-from avn.errors import UserError
+from avn.core.actions import HEADINGS
+from avn.core.errors import UserError
+from avn.core.pose import turned
 from avn.mapping.base import Mapper
 from avn.mapping.frames import FrameVotes, turned_walls
 from avn.mapping.occupancy_map import CERTAIN, OccupancyMap
 from avn.mapping.occupancy_mapper import take_in
-from avn.mapping.pose import turned
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
-from avn.navigation.actions import HEADINGS
 from avn.planning.partial_graph import GraphRules, PartialGraph
 
 if TYPE_CHECKING:

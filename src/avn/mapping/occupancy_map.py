@@ -5,10 +5,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from avn.errors import UserError
-from avn.mapping.pose import turned
-from avn.navigation.actions import HEADINGS
-from avn.views.window import WINDOW, window_offsets
+from avn.apartments.local_patch import WINDOW, window_offsets
+from avn.core.actions import HEADINGS
+from avn.core.errors import UserError
+from avn.core.pose import turned
 
 # What is known beyond doubt lies at this log odds, which no picture outweighs.
 CERTAIN = 30.0

@@ -8,10 +8,10 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
+from avn.core.actions import HEADINGS
+from avn.core.pose import turned
 from avn.mapping.base import Mapper
 from avn.mapping.occupancy_map import CERTAIN, OccupancyMap
-from avn.mapping.pose import turned
-from avn.navigation.actions import HEADINGS
 from avn.planning.partial_graph import GraphRules, PartialGraph
 
 if TYPE_CHECKING:

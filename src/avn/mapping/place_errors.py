@@ -7,8 +7,8 @@ import torch
 from torch import Tensor
 
 from avn.apartments.floor_plan import CELL
+from avn.core.actions import HEADINGS
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
-from avn.navigation.actions import HEADINGS
 
 WALKED, OTHER, ALL = "walked", "other", "all"
 

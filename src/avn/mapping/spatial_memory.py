@@ -8,8 +8,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from avn.errors import UserError
-from avn.navigation.actions import HEADINGS
+from avn.core.actions import HEADINGS
+from avn.core.errors import UserError
 
 
 class SpatialMemory:

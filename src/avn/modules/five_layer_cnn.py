@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from torch import Tensor, nn
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 
 @dataclass

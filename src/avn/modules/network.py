@@ -11,12 +11,11 @@ import lightning as L
 import torch
 from hydra.errors import InstantiationException
 from hydra.utils import instantiate
-from lightning.pytorch.callbacks import Callback
 from lightning.pytorch.utilities.types import OptimizerLRSchedulerConfig
 from torch import nn
 from torch.optim.lr_scheduler import LambdaLR
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 # The two sets of apartments on which a network in training is measured, in this order.
 SPLITS = ("validation", "training")
@@ -105,10 +104,6 @@ class Network(L.LightningModule):
 
     def prepare(self, data: Any) -> None:
         """Learn of the data module what the metrics need, before training."""
-
-    def figures(self) -> list[Callback]:
-        """What shows the training's figures in TensorBoard."""
-        return []
 
     def on_train_epoch_start(self) -> None:
         """Draw all that is random from the epoch, so that a resumed run goes on exactly."""

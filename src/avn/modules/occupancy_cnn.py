@@ -6,17 +6,15 @@ from dataclasses import dataclass, field
 from typing import Any, TypedDict
 
 import torch
-from lightning.pytorch.callbacks import Callback
 from omegaconf import MISSING
 from torch import Tensor, nn
 from torchmetrics import MeanMetric
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.modules.network import SPLITS, Network, OptimizerConfig
 from avn.modules.view_augment import AugmentConfig
 from avn.modules.window_metrics import WindowScores, calibrated, calibration
 from avn.modules.window_net import WindowNetConfig
-from avn.reporting.window_figures import WindowFigures
 from avn.views.camera import CameraConfig
 
 
@@ -37,7 +35,7 @@ class ViewBatch(TypedDict):
 class OccupancyConfig:
     """What sees the cells ahead, with the recipe that trains it."""
 
-    _target_: str = "avn.modules.occupancy_cnn.OccupancyCnn"
+    _target_: str | None = "avn.modules.occupancy_cnn.OccupancyCnn"
     # The parts arrive as plain dicts: a checkpoint can hold them, and `weights_only=True` reads it.
     _recursive_: bool = False
     _convert_: str = "all"
@@ -99,7 +97,7 @@ class OccupancyCnn(Network):
     """
 
     calibration: Tensor
-    node = "mapper.network"
+    node = "occupancy_model"
     what = "occupancy network"
     unit = "views"
     monitor = "loss/validation/all"
@@ -169,10 +167,6 @@ class OccupancyCnn(Network):
     def _net(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         centred = (pictures - 0.5) / 0.25
         return self.net(centred.contiguous(memory_format=torch.channels_last))
-
-    def figures(self) -> list[Callback]:
-        """Views with their windows as they are and as they are thought to be."""
-        return [WindowFigures()]
 
     def training_step(self, batch: ViewBatch, index: int) -> Tensor:
         """Cross-entropies of free and visible cells, and the error of the inverse depth."""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from torch import Tensor, nn
 
-from avn.errors import UserError
+from avn.apartments.local_patch import WINDOW
+from avn.core.errors import UserError
 from avn.views.camera import CameraConfig
-from avn.views.window import WINDOW
 
 OUTPUTS = 2
 

@@ -7,18 +7,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import torch
-from lightning.pytorch.callbacks import Callback
 from omegaconf import MISSING
 from torch import Tensor, nn
 from torchmetrics import MeanSquaredError
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.modules.five_layer_cnn import FiveLayerCnn, NetConfig
 from avn.modules.listener import Listener, PictureBatch
 from avn.modules.network import SPLITS, OptimizerConfig
 from avn.modules.sound_metrics import LocationErrors
 from avn.modules.spectrogram import SpectrogramConfig
-from avn.reporting.sound_figures import SoundFigures
 
 
 @dataclass
@@ -143,10 +141,6 @@ class SoundCnn(Listener):
         straight, mirrored = self.net.answer(hidden).chunk(2)
         location = (straight + mirrored * mirrored.new_tensor(self.mirror_signs)) / 2
         return torch.cat((*hidden.chunk(2), location), dim=1)
-
-    def figures(self) -> list[Callback]:
-        """Locations on a floor plan, spectrograms and audio."""
-        return [SoundFigures()]
 
     def name_sounds(self, sounds: Sequence[str]) -> None:
         """Say what the sounds of the batches are called; the metrics are by these names."""

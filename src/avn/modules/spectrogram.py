@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 # Power is never logged below this; it lies under the microphone's noise floor in any band.
 POWER_FLOOR = 1e-12

@@ -8,17 +8,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import torch
-from lightning.pytorch.callbacks import Callback
 from torch import Tensor, nn
 from torchmetrics import MeanMetric
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.modules.five_layer_cnn import NetConfig
 from avn.modules.listener import Listener, PictureBatch
 from avn.modules.network import SPLITS
 from avn.modules.sound_cnn import SoundModelConfig
 from avn.modules.stop_metrics import CRITERIA, StopScores
-from avn.reporting.stop_figures import StopFigures
 
 
 @dataclass
@@ -109,10 +107,6 @@ train_seed, sounds_per_pair, validation_clips
     def log_odds(self, pictures: Tensor) -> Tensor:
         """(N, channels, bands, frames) pictures to (N,), put right for the prior."""
         return self.estimate(pictures)[:, 0] + self.log_odds_shift
-
-    def figures(self) -> list[Callback]:
-        """ROC curve, calibration and a map of where it would stop."""
-        return [StopFigures()]
 
     def prepare(self, data: Any) -> None:
         """Take the sounds' names, and how seldom a state is at the goal."""

@@ -10,7 +10,7 @@ from torchmetrics import Metric
 from torchmetrics.functional.classification import binary_auroc, binary_calibration_error
 from torchmetrics.utilities.data import dim_zero_cat
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.modules.sound_metrics import ALL, SIGHTS
 
 # Times that an agent listens at the goal before it has walked off again.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,17 +14,21 @@ import torch
 from lightning.pytorch.callbacks import Callback, EarlyStopping, ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
 
-from avn.datamodules.ahead import threads_for_one_operation
-from avn.errors import UserError
+from avn.core.errors import UserError
+from avn.core.prefetch import threads_for_one_operation
+from avn.core.progress import progress_bar
 from avn.modules.network import Network
-from avn.progress import progress_bar
 
 BEST, LAST = "best.ckpt", "last.ckpt"
 Trained = TypeVar("Trained", bound=Network)
 
 
 def fit(
-    data: L.LightningDataModule, model: Network, folder: Path, accelerator: str = "auto"
+    data: L.LightningDataModule,
+    model: Network,
+    folder: Path,
+    callbacks: Sequence[Callback] = (),
+    accelerator: str = "auto",
 ) -> dict[str, Any]:
     """Train a network in a folder, or go on where a stopped training was.
 
@@ -39,6 +43,8 @@ def fit(
     model : Network
         Built from the same recipe as `data`.
     folder : Path
+    callbacks : sequence of Callback
+        Further ones, such as those that show figures in TensorBoard.
     accelerator : str
         Lightning's name of the device to compute on.
 
@@ -59,7 +65,7 @@ def fit(
     model.prepare(data)
     history = _History()
     # Patience and the best checkpoint come before the last one, which so holds their state.
-    callbacks = [
+    every = [
         EarlyStopping(
             model.monitor,
             mode=model.mode,
@@ -67,7 +73,7 @@ def fit(
             check_on_train_epoch_end=True,
         ),
         history,
-        *model.figures(),
+        *callbacks,
         _Progress(),
         _every_epoch(folder, BEST, model.monitor, model.mode),
         _every_epoch(folder, LAST, None),
@@ -83,7 +89,7 @@ def fit(
             devices=1,
             max_epochs=model.hparams["epochs"],
             logger=TensorBoardLogger(folder, name="", version="", default_hp_metric=False),
-            callbacks=callbacks,
+            callbacks=every,
             num_sanity_val_steps=0,
             enable_progress_bar=False,
             enable_model_summary=False,

@@ -11,9 +11,9 @@ import torch
 from torch import Tensor, nn
 
 from avn.apartments.floor_plan import CELL
-from avn.errors import UserError
+from avn.apartments.local_patch import WINDOW, window_offsets
+from avn.core.errors import UserError
 from avn.views.camera import CameraConfig
-from avn.views.window import WINDOW, window_offsets
 
 # Where in a cell features are looked up, in metres: right and front of its centre, over the floor.
 PROBES = (

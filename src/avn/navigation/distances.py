@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import CELL
 from avn.apartments.grid import Grid
-from avn.navigation.actions import HEADINGS
+from avn.core.actions import HEADINGS
 from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
 

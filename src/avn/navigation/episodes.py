@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.errors import UserError
-from avn.navigation.actions import HEADINGS
+from avn.core.actions import HEADINGS
+from avn.core.errors import UserError
+from avn.core.random import derive, scramble
 from avn.navigation.exploration import EXPLORATIONS, own_walks, shared_walk
-from avn.navigation.hashing import derive, scramble
 from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
 

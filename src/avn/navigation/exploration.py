@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.navigation.actions import FORWARD, HEADINGS, ROTATE_LEFT, ROTATE_RIGHT, transitions
-from avn.navigation.hashing import scramble, uniform
+from avn.core.actions import FORWARD, HEADINGS, ROTATE_LEFT, ROTATE_RIGHT, transitions
+from avn.core.random import scramble, uniform
 
 FORWARD_SHARE = 0.5
 # Draws of a walk before it is cut short instead.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.grid import STEPS, Grid, moves_between
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 
 class Place(Protocol):

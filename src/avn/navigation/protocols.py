@@ -10,8 +10,8 @@ from omegaconf import MISSING
 
 from avn.apartments.floor_plan import CELL
 from avn.apartments.grid import Grid, goal_cells
-from avn.errors import UserError
-from avn.navigation.actions import STOP
+from avn.core.actions import STOP
+from avn.core.errors import UserError
 
 GOALS = ("box", "radius")
 PATHS = ("attempted", "walked")

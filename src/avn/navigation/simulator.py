@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from tensordict import TensorDict
 from torch import Tensor
 
-from avn.navigation.actions import ACTIONS, BACKWARD, HEADINGS, STOP, transitions
+from avn.core.actions import ACTIONS, BACKWARD, HEADINGS, STOP, transitions
+from avn.core.random import scramble
 from avn.navigation.distances import Distances, measure
 from avn.navigation.episodes import Episodes
-from avn.navigation.hashing import scramble
 from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
 

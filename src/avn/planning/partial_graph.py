@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.navigation.actions import BACKWARD, FORWARD, ROTATE_LEFT
+from avn.core.actions import BACKWARD, FORWARD, ROTATE_LEFT
 
 NO_ACTION = -1
 _EMPTY = np.inf

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 SOURCES = ("newest", "belief")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.navigation.metrics import cluster_bootstrap
 from avn.reporting.trajectory_figures import RUN_COLOURS, figure_of
 

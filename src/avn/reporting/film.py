@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from avn.acoustics.dry_sounds import RATE
-from avn.errors import UserError
+from avn.core.actions import HEADINGS
+from avn.core.errors import UserError
+from avn.core.files import written_whole
 from avn.modules.spectrogram import Spectrogram
-from avn.navigation.actions import HEADINGS
 from avn.navigation.trace import Thoughts, Trace
 from avn.reporting.sound_figures import draw_plan
 from avn.reporting.trajectory_figures import draw_place, extent, outcome, plan_of, title_of
-from avn.stages import written_whole
 
 # Frames a second; a cursor runs over the spectrogram, and nothing else moves within a second.
 FPS = 5
@@ -54,7 +54,7 @@ def write_film(
     clips : (T + 1, 2, 16000) float32 tensor
         What is heard at each step, for the spectrogram.
     track : (16000 (T + 1), 2) float32
-        The same as the film's sound; see `avn.perceived.soundtrack`.
+        The same as the film's sound; see `avn.pipeline.observed.soundtrack`.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from avn.stages import written_whole
+from avn.core.files import written_whole
 
 CARD = "model_card.md"
 # Headings after Mitchell et al., "Model cards for model reporting" (FAT* 2019), where they apply.

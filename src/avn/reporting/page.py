@@ -10,7 +10,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.reporting.breakdown import breakdown_figure
 from avn.reporting.page_media import figure_url
 from avn.reporting.results import ALL_SOUNDS, AVERAGE, compare

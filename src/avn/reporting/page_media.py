@@ -15,7 +15,7 @@ from PIL import Image
 
 from avn.acoustics.dry_sounds import RATE
 from avn.apartments.floor_plan import CELL
-from avn.navigation.actions import HEADINGS
+from avn.core.actions import HEADINGS
 from avn.navigation.place import Place
 from avn.navigation.trace import Trace
 from avn.reporting.trajectory_figures import draw_apartment, outcome, title_of

@@ -14,7 +14,7 @@ def heard_table(heard: pd.DataFrame) -> Table:
     Parameters
     ----------
     heard : DataFrame
-        As `avn.modules.hearing.sound_errors` gives it, of any number of rooms.
+        As `avn.pipeline.audio_inference.sound_errors` gives it, of any number of rooms.
     """
     columns = ("metres off", "degrees off", "over 90 degrees off")
     table = _table("what is heard, medians of the rooms", columns)
@@ -33,7 +33,7 @@ def windows_table(seen: pd.DataFrame) -> Table:
     Parameters
     ----------
     seen : DataFrame
-        As `avn.seeing.window_errors` gives it.
+        As `avn.pipeline.occupancy.window_errors` gives it.
     """
     columns = ("ROC AUC", "accuracy", "calibration error")
     table = _table("which cells look free", columns)

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from avn.errors import UserError
+from avn.core.errors import UserError
+from avn.core.files import written_whole
 from avn.navigation.metrics import cluster_bootstrap
-from avn.stages import written_whole
 
 LABELS = ("agent", "protocol", "acoustics", "look")
 EPISODE_COLUMNS = (
@@ -35,7 +35,7 @@ def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
     Parameters
     ----------
     episodes : DataFrame
-        Records as `avn.navigation.run.walk_room` makes them; any number of agents, protocols,
+        Records as `avn.agents.rollout.walk_room` makes them; any number of agents, protocols,
         sounds, rooms and seeds.
     draws : int
         Resamples of the bootstrap.

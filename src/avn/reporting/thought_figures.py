@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from avn.navigation.actions import HEADINGS
+from avn.core.actions import HEADINGS
 from avn.navigation.trace import Thoughts, Trace
 from avn.reporting.sound_figures import draw_plan
 from avn.reporting.trajectory_figures import (

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import CELL, FloorPlan
-from avn.navigation.actions import HEADINGS
+from avn.core.actions import HEADINGS
 from avn.navigation.place import Place
 from avn.navigation.trace import Trace
 from avn.reporting.floor_plan_figure import draw_floor_plan

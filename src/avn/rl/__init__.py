@@ -13,6 +13,6 @@ if find_spec("gymnasium"):
     if "avn/Walk-v0" not in gymnasium.registry:
         gymnasium.register(
             id="avn/Walk-v0",
-            entry_point="avn.rl.walk_gym:make_walk",
-            vector_entry_point="avn.rl.walk_gym:make_walks",
+            entry_point="avn.integrations.gymnasium:make_walk",
+            vector_entry_point="avn.integrations.gymnasium:make_walks",
         )

@@ -15,13 +15,13 @@ from typing import Any
 import torch
 from torch.utils.tensorboard import SummaryWriter
 
-from avn.errors import UserError
-from avn.progress import progress_bar
+from avn.core.errors import UserError
+from avn.core.files import written_whole
+from avn.core.progress import progress_bar, tell
 from avn.rl.crew import start_crew
 from avn.rl.networks import ActorCritic
 from avn.rl.shared import SharedState, flatten_parameters
 from avn.rl.worker import Task
-from avn.stages import tell, written_whole
 
 LAST, BEST, CURVE = "last.ckpt", "best.ckpt", "curve.json"
 # By which figure the best network is chosen.

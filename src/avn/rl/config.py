@@ -4,30 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from avn.errors import UserError
+from avn.core.errors import UserError
+from avn.navigation.reward import RewardConfig
 
 ORDERS = ("free", "round_robin")
 COLLECTORS = ("lean", "torchrl")
 SCHEDULES = ("constant", "linear")
-
-
-@dataclass
-class RewardConfig:
-    """What each action earns: one of the three.
-
-    Attributes
-    ----------
-    success : float
-        Where the episode succeeds.
-    collision : float
-        For a move that was blocked.
-    step : float
-        For any other action.
-    """
-
-    success: float = 10.0
-    collision: float = -0.1
-    step: float = -0.01
 
 
 @dataclass

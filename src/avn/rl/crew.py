@@ -12,10 +12,10 @@ from typing import Any, Protocol
 import torch
 import torch.multiprocessing as mp
 
-from avn.errors import UserError
+from avn.core.errors import UserError
+from avn.core.progress import tell
 from avn.rl.shared import SharedState
 from avn.rl.worker import Task, Worker
-from avn.stages import tell
 
 Report = tuple[dict[str, float], dict[str, Any]]
 # Seconds after which the progress is looked at again.

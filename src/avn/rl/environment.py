@@ -11,11 +11,11 @@ from torch import Tensor, nn
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.mapping.ego_map import EgoMap
+from avn.navigation.tables import Tables
+from avn.navigation.world import World
 from avn.rl.explorations import Explorations
-from avn.rl.tables import Tables
-from avn.rl.world import World
 
 # What an agent may observe beside what is heard and seen.
 OWN = ("collided", "odometry", "map")

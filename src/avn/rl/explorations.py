@@ -16,14 +16,14 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
+from avn.core.actions import HEADINGS
+from avn.core.random import derive, scramble
 from avn.mapping.ego_map import EgoMap, around, offsets
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
-from avn.navigation.actions import HEADINGS
 from avn.navigation.exploration import explore
-from avn.navigation.hashing import derive, scramble
 from avn.navigation.place import Place
+from avn.navigation.tables import Tables
 from avn.rl.networks import ActorCritic
-from avn.rl.tables import Tables
 
 
 class Explorations:

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torchrl.modules import LSTMModule
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 # Length of a standardised feature: with it as long as it has parts, one step of the optimiser would
 # turn the trunk over.

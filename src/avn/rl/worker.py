@@ -10,8 +10,11 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from avn.navigation.hashing import derive
+from avn.core.random import derive
 from avn.navigation.protocols import Protocol
+from avn.navigation.starts import build_starts
+from avn.navigation.tables import Tables
+from avn.navigation.world import World
 from avn.rl.collectors import COLLECTORS
 from avn.rl.config import A3CConfig
 from avn.rl.environment import WalkEnv
@@ -20,9 +23,6 @@ from avn.rl.losses import ActorCriticLoss
 from avn.rl.networks import ActorCritic, Shape
 from avn.rl.policy import Policy
 from avn.rl.shared import SharedState, flatten_parameters
-from avn.rl.starts import build_starts
-from avn.rl.tables import Tables
-from avn.rl.world import World
 
 Turn = Callable[[], AbstractContextManager[Any]]
 

@@ -20,8 +20,8 @@ import torch
 from numpy.typing import NDArray
 from torch.nn.functional import interpolate, normalize
 
-from avn.errors import UserError
-from avn.stages import digest, file_hash
+from avn.core.errors import UserError
+from avn.core.hashing import digest, file_hash
 
 # Raised when the code changes the features.
 VERSION = 1
@@ -169,7 +169,7 @@ def features(
     rgb : (S, H, W, 3) uint8
         sRGB.
     progress : callable, optional
-        Is told how many views have been done since it was told last; see `avn.progress`.
+        Is told how many views have been done since it was told last; see `avn.core.progress`.
 
     Returns
     -------

@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.apartments.floor_plan import (
-    CEILING,
-    DOOR_HEIGHT,
-    DOOR_WIDTH,
-    WALL_THICKNESS,
-    FloorPlan,
-)
+from avn.apartments.floor_plan import CEILING, DOOR_HEIGHT, DOOR_WIDTH, WALL_THICKNESS, FloorPlan
 from avn.apartments.surfaces import BUILDING, DOOR_FRAME, PANE, Rect, _subtract_all, build_surfaces
 from avn.views.decor import BORDER, DEPTH, Hanging, hangings
 from avn.views.drawing import draw, to_linear

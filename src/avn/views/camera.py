@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.errors import UserError
+from avn.core.errors import UserError
 
 
 @dataclass

@@ -20,19 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.views import shading
 from avn.views.eye import Eye
 from avn.views.lighting import LightConfig
 from avn.views.raycast import Raycast, RaycastConfig
 from avn.views.rays import Triangles
-from avn.views.renderer import (
-    Prepared,
-    Renderer,
-    RendererConfig,
-    check_light,
-    check_range,
-)
+from avn.views.renderer import Prepared, Renderer, RendererConfig, check_light, check_range
 from avn.views.scenery import Scenery, scenery
 
 _INSTALL = (

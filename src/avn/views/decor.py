@@ -8,14 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from avn.apartments.floor_plan import (
-    DOOR_WIDTH,
-    WALL_THICKNESS,
-    Doorway,
-    FloorPlan,
-    Room,
-    Window,
-)
+from avn.apartments.floor_plan import DOOR_WIDTH, WALL_THICKNESS, Doorway, FloorPlan, Room, Window
 from avn.apartments.surfaces import Rect
 from avn.views.drawing import Image, draw, noise
 from avn.views.pools import COLOURS

@@ -15,13 +15,7 @@ from avn.views.light_points import choose_points, normals_of
 from avn.views.lighting import LightConfig, bake
 from avn.views.mesh import BUILDING, split
 from avn.views.rays import Triangles
-from avn.views.renderer import (
-    Prepared,
-    Renderer,
-    RendererConfig,
-    check_light,
-    check_range,
-)
+from avn.views.renderer import Prepared, Renderer, RendererConfig, check_light, check_range
 from avn.views.scenery import scenery
 
 # Levels of a picture that are skipped where only its colour near a triangle counts.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import CEILING, FloorPlan
-from avn.errors import UserError
+from avn.core.errors import UserError
 from avn.views.camera import CameraConfig
 from avn.views.lighting import LightConfig
 

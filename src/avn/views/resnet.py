@@ -12,8 +12,8 @@ from urllib.parse import urlparse
 
 import torch
 
-from avn.errors import UserError
-from avn.stages import digest, file_hash
+from avn.core.errors import UserError
+from avn.core.hashing import digest, file_hash
 from avn.views.backbone import Backbone, BackboneConfig, first_line
 
 # Means and standard deviations of ImageNet's channels, 0 to 1, that its ResNets were trained with.

@@ -1,0 +1,212 @@
+"""What makes Hydra answer as the README says.
+
+Beyond `hydra.main`: `-m` anywhere on the line, list keys without brackets, a path to an audio
+file as an option of the group `sound`, keys checked even behind `+`, sweeps that name what
+failed, and every mistake of the user's as one line and exit code 2.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+import sys
+import traceback
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import hydra
+import yaml
+from hydra.core.hydra_config import HydraConfig
+from hydra.core.plugins import Plugins
+from hydra.errors import HydraException, OverrideParseException
+from hydra.types import RunMode
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from avn.config import audio_source, schema, sweeps
+from avn.config.folder import conf_folder
+from avn.core.errors import UserError
+
+LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments")
+USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
+
+
+def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]], Callable[[], int]]:
+    """Make a command of a function that takes the composed config.
+
+    The command returns the exit code: 0, 1 for a fault of ours, 2 for a mistake of the
+    user's, 130 when interrupted.
+    """
+
+    def decorate(task: Callable[[DictConfig], Path | None]) -> Callable[[], int]:
+        def main() -> int:
+            return _run(config_name, task)
+
+        return main
+
+    return decorate
+
+
+def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
+    schema.register()
+    _register_plugins()
+    name = f"avn.{config_name}"
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises what it would print itself
+    errors: list[Exception] = []
+
+    def job(cfg: DictConfig) -> None:
+        if HydraConfig.get().mode == RunMode.MULTIRUN:
+            sweeps.run_job(checked, cfg, explain)
+            return
+        try:
+            checked(cfg)
+        except Exception as error:  # kept from Hydra, which would print lines of its own
+            errors.append(error)
+
+    def checked(cfg: DictConfig) -> Path | None:
+        check_keys(cfg)
+        return task(cfg)
+
+    job.__module__ = name
+    is_sweep = False
+    try:
+        sys.argv = [sys.argv[0], *arrange(sys.argv[1:])]
+        is_sweep = "--multirun" in sys.argv
+        if is_sweep:
+            sweeps.begin()
+        hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=config_name)(
+            job
+        )()
+        if errors:
+            return _report(name, errors[0], explain(errors[0]))
+        return sweeps.end(name) if is_sweep else 0
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        return _report(name, error, explain(error, composed=False))
+    finally:
+        if is_sweep:
+            sweeps.forget()
+
+
+def plainly(name: str, task: Callable[[], None]) -> int:
+    """Run a command that has no config of its own; the exit codes are those of `command`."""
+    try:
+        task()
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        return _report(name, error, explain(error))
+    return 0
+
+
+def _report(name: str, error: Exception, line: str | None) -> int:
+    if line is None:
+        traceback.print_exception(error)
+        return 1
+    print(f"{name}: {line}", file=sys.stderr)
+    return 2
+
+
+def arrange(arguments: Iterable[str]) -> list[str]:
+    """Put the command line into the form that Hydra's parser takes.
+
+    `-m` comes first wherever it stood, declared list keys get their brackets, and the paths
+    of audio files their quotes.
+
+    Raises
+    ------
+    UserError
+        Where a group is given no option.
+    """
+    sweep, rest = [], []
+    groups = _groups()
+    for argument in arguments:
+        key, equals, value = argument.partition("=")
+        if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
+            raise UserError(f"{argument}: name an option, such as 'none'; there are {groups[key]}")
+        if argument in ("-m", "--multirun"):
+            sweep = ["--multirun"]
+        elif equals and key in LIST_KEYS and not value.startswith("["):
+            rest.append(f"{key}=[{value}]")
+        elif equals and key == "sound":
+            rest.append(f"sound={audio_source.quoted(value)}")
+        else:
+            rest.append(argument)
+    return sweep + rest
+
+
+def _groups() -> dict[str, str]:
+    """The config groups and a list of their options."""
+    folders = [folder for folder in sorted(conf_folder().iterdir()) if folder.is_dir()]
+    return {f.name: ", ".join(sorted(file.stem for file in f.glob("*.yaml"))) for f in folders}
+
+
+def check_keys(cfg: DictConfig, path: str = "") -> None:
+    """Refuse keys that no schema declares, which `+key=` and open nodes would let through.
+
+    Raises
+    ------
+    UserError
+        Naming the key and those that there are.
+    """
+    schema = OmegaConf.get_type(cfg)
+    if dataclasses.is_dataclass(schema):
+        known = [field.name for field in dataclasses.fields(schema)]
+        for key in map(str, cfg):
+            if key not in known:
+                raise UserError(f"{path}{key}: no such key; there are {', '.join(known)}")
+    for key in map(str, cfg):
+        node = None if OmegaConf.is_missing(cfg, key) else cfg[key]
+        if isinstance(node, DictConfig):
+            check_keys(node, f"{path}{key}.")
+
+
+def explain(error: BaseException, composed: bool = True) -> str | None:
+    """One line for a mistake of the user's; None where the fault is ours.
+
+    What goes wrong before the job starts comes of the command line or of a config file, so
+    there every exception counts as the user's.
+    """
+    chain = [error]
+    while (cause := chain[-1].__cause__ or chain[-1].__context__) and cause not in chain:
+        chain.append(cause)
+    for link in chain:
+        if isinstance(link, UserError):
+            return _one_line(str(link))
+        if isinstance(link, OverrideParseException):
+            return f"{link.override}: cannot be read; put quotes round what Hydra reads as grammar"
+        if isinstance(link, AssertionError) and (key := _overridden(link)):
+            part = key.rpartition(".")[0]
+            return f"{key}: '{part}' is null in this config; leave it out"
+    for link in chain:
+        if isinstance(link, OSError) and link.filename and not isinstance(link, HydraException):
+            return _one_line(f"{link.filename}: {link.strerror}")
+    if not composed or isinstance(error, USER_MISTAKES):
+        first, *causes = dict.fromkeys(_one_line(str(link)) for link in chain if str(link))
+        return "; ".join([first, *(cause for cause in causes[:1] if cause not in first)])
+    return None
+
+
+def _overridden(error: BaseException) -> str:
+    """The key that Hydra was about to set; what OmegaConf asserts does not name it."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        if frame.f_code.co_name == "_apply_overrides_to_config":
+            return str(frame.f_locals.get("key") or "")
+    return ""
+
+
+def _one_line(text: str) -> str:
+    text = text.split("Config search path:")[0]
+    text = re.sub(r"To append to your config use \S+", "", text)  # which is refused too
+    text = re.sub(r"\s+\w*schema\b", "", text)  # the dataclasses stand among the options
+    text = re.sub(r"\s*(full_key|object_type|reference_type)[:=]\s*\S*", "", text)
+    return " ".join(text.split())
+
+
+def _register_plugins() -> None:
+    for plugin in (audio_source.AudioFiles, audio_source.AudioFilesPath):
+        Plugins.instance().register(plugin)

@@ -1,0 +1,44 @@
+"""Fingerprints: SHA-256 of plain values, configs, dataclasses and files."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from omegaconf import DictConfig, ListConfig, OmegaConf
+
+
+def digest(*parts: Any) -> str:
+    """SHA-256, in hex, of plain values, configs and dataclasses; order of keys is of no account."""
+    return hashlib.sha256(canonical(parts).encode()).hexdigest()
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256, in hex, of a file's bytes."""
+    found = path.stat()
+    return _file_hash(path, found.st_mtime_ns, found.st_size)
+
+
+@lru_cache(maxsize=64)
+def _file_hash(path: Path, changed: int, size: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def canonical(value: Any) -> str:
+    """The one JSON text of a value, on which `digest` is computed."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, DictConfig | ListConfig):
+        return OmegaConf.to_container(value, resolve=True)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return dataclasses.asdict(value)
+    if isinstance(value, np.ndarray):
+        return [str(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
+    raise TypeError(f"cannot hash a {type(value).__name__}")

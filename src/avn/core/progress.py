@@ -1,0 +1,76 @@
+"""What long work tells its user: lines, lengths of time, and bars with a rate and the time left."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+# Where bars are drawn while a dashboard stands on the screen.
+_shared: list[Progress] = []
+
+
+class _Rate(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        speed = task.finished_speed or task.speed
+        return Text(f"{speed:.0f} {task.fields['unit']}/s" if speed else "")
+
+
+def progress_columns(console: Console) -> Progress:
+    """Bars with a rate and the time left, not yet shown."""
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        _Rate(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    return Progress(*columns, console=console, speed_estimate_period=60)
+
+
+@contextmanager
+def bars_in(progress: Progress) -> Iterator[None]:
+    """Draw the bars of the block among those of a dashboard, each as long as its work lasts."""
+    _shared.append(progress)
+    try:
+        yield
+    finally:
+        _shared.pop()
+
+
+@contextmanager
+def progress_bar(what: str, total: int, unit: str) -> Iterator[Callable[[int], None]]:
+    """Show a bar on the error stream; the block calls what it gets with each count done."""
+    if _shared:
+        progress = _shared[-1]
+        task = progress.add_task(what, total=total, unit=unit)
+        try:
+            yield lambda count: progress.advance(task, count)
+        finally:
+            progress.remove_task(task)
+        return
+    with progress_columns(Console(file=sys.stderr)) as progress:
+        task = progress.add_task(what, total=total, unit=unit)
+        yield lambda count: progress.advance(task, count)
+
+
+def tell(line: str) -> None:
+    """Print one line for the user, at once."""
+    print(line, flush=True)
+
+
+def span(seconds: float) -> str:
+    """A length of time in words, such as `40 s` or `2.5 min`."""
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.1f} min"

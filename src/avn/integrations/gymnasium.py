@@ -1,0 +1,191 @@
+"""The same world for Gymnasium; `import avn.rl` makes it known as "avn/Walk-v0"."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from numpy.typing import NDArray
+from torch import Tensor
+
+from avn.config import schema
+from avn.config.folder import conf_folder
+from avn.navigation.world import World
+from avn.pipeline import policy
+from avn.rl.environment import WalkEnv
+
+Observation = dict[str, NDArray[Any]]
+
+
+class WalkGym(gymnasium.Env[Observation, int]):
+    """One agent that walks.
+
+    Parameters
+    ----------
+    world : World
+        With one episode at a time.
+    observes : sequence of str
+        See `avn.rl.environment.WalkEnv`.
+    """
+
+    def __init__(self, world: World, observes: Sequence[str]) -> None:
+        self.metadata = {"render_modes": []}
+        self._env = WalkEnv(world, observes)
+        self.observation_space: spaces.Space[Any] = _space(self._env)
+        self.action_space: spaces.Space[Any] = spaces.Discrete(world.protocol.actions)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin a new episode."""
+        super().reset(seed=seed)
+        if seed is not None:
+            self._env.set_seed(seed)
+        self._env.begin(torch.ones(1, dtype=torch.bool))
+        return self._seen(), {}
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """One action."""
+        outcome = self._env.move(torch.tensor([int(action)]))
+        reward, terminated, truncated = (value.item() for value in outcome)
+        return self._seen(), float(reward), bool(terminated), bool(truncated), {}
+
+    def _seen(self) -> Observation:
+        return {name: value[0] for name, value in _arrays(self._env).items()}
+
+
+class WalkVector(VectorEnv[Observation, NDArray[Any], NDArray[Any]]):
+    """N agents that walk at once; an episode that ends begins anew in the same step."""
+
+    def __init__(self, world: World, observes: Sequence[str]) -> None:
+        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+        self._env, self.num_envs = WalkEnv(world, observes), world.n
+        self.single_observation_space = _space(self._env)
+        self.single_action_space = spaces.Discrete(world.protocol.actions)
+        self.observation_space = batch_space(self.single_observation_space, world.n)
+        self.action_space = batch_space(self.single_action_space, world.n)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin new episodes."""
+        super().reset(seed=seed)
+        if seed is not None:
+            self._env.set_seed(seed)
+        self._env.begin(torch.ones(self.num_envs, dtype=torch.bool))
+        return _arrays(self._env), {}
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+        """One action in each episode."""
+        outcome = self._env.move(torch.as_tensor(actions, dtype=torch.int64))
+        reward, terminated, truncated = (value.numpy() for value in outcome)
+        done, info = terminated | truncated, {}
+        if done.any():
+            info = {"final_obs": _arrays(self._env), "_final_obs": done}
+            self._env.begin(torch.from_numpy(done))
+        return _arrays(self._env), reward.astype(np.float64), terminated, truncated, info
+
+
+def make_walk(
+    overrides: Sequence[str] = (),
+    part: str = "train",
+    observes: Sequence[str] | None = None,
+    max_steps: int | None = 200,
+    **_: Any,
+) -> WalkGym:
+    """One agent in the apartments of a config.
+
+    Parameters
+    ----------
+    overrides : sequence of str
+        Of `python -m avn.train model=a3c_va`, such as `split=mini`.
+    part : {"train", "validation"}
+        Whose apartments.
+    observes : sequence of str, optional
+        What the agent observes; by default what the row of the model does.
+    max_steps : int or None
+        Actions after which an episode is truncated; None for the limits of the protocol.
+    """
+    return WalkGym(*_world(tuple(overrides), part, 1, observes, max_steps))
+
+
+def make_walks(
+    num_envs: int = 1,
+    overrides: Sequence[str] = (),
+    part: str = "train",
+    observes: Sequence[str] | None = None,
+    max_steps: int | None = 200,
+    **_: Any,
+) -> WalkVector:
+    """N agents at once; see `make_walk`."""
+    return WalkVector(*_world(tuple(overrides), part, num_envs, observes, max_steps))
+
+
+def _world(
+    overrides: tuple[str, ...],
+    part: str,
+    n: int,
+    observes: Sequence[str] | None,
+    max_steps: int | None,
+) -> tuple[World, Sequence[str]]:
+    (tables, protocol, recipe), default = _tables(overrides, part)
+    world = policy.free_world(tables, protocol, recipe, n, max_steps)
+    return world, observes or default
+
+
+@lru_cache(maxsize=4)
+def _tables(overrides: tuple[str, ...], part: str) -> tuple[Any, tuple[str, ...]]:
+    # many environments of one process look into the same tables
+    cfg = _config(overrides)
+    names = policy.observed_names(cfg)
+    return policy.open_tables(cfg, part), names
+
+
+def _config(overrides: tuple[str, ...]) -> Any:
+    """The config of `avn.train`, also from within a command of Hydra."""
+    schema.register()
+    chosen = [*([] if any(o.startswith("model=") for o in overrides) else ["model=a3c_va"])]
+    if GlobalHydra.instance().is_initialized():
+        return compose("train", overrides=[*chosen, *overrides])
+    with initialize_config_dir(str(conf_folder().resolve()), version_base="1.3"):
+        return compose("train", overrides=[*chosen, *overrides])
+
+
+def _arrays(env: WalkEnv) -> Observation:
+    seen = env.look()
+    shown = env.features(seen["state"], seen["clip"])
+    shown |= {name: seen[name] for name in env.observes if name in seen}
+    return {name: _array(shown[name]) for name in env.observes}
+
+
+def _array(value: Tensor) -> NDArray[Any]:
+    if value.dtype == torch.bool:
+        return value.numpy().astype(np.int8)[:, None]
+    return value.float().numpy() if value.dtype == torch.float16 else value.numpy()
+
+
+def _space(env: WalkEnv) -> spaces.Dict:
+    """What one agent observes, as a space."""
+    own: dict[str, spaces.Space[Any]] = {}
+    for name, value in _arrays(env).items():
+        if name in _RANGES:
+            low, high = _RANGES[name]
+        else:
+            low, high = env.features.range(name)
+        own[name] = spaces.Box(low, high, value.shape[1:], value.dtype.type)
+    return spaces.Dict(own)
+
+
+# Odometry counts cells, of which no apartment has so many in a row.
+_RANGES = {"map": (0.0, 1.0), "collided": (0, 1), "odometry": (-10_000, 10_000)}

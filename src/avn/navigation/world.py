@@ -1,0 +1,151 @@
+"""N episodes in several apartments that begin anew by themselves, as tensors of numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from avn.core.actions import ACTIONS, BACKWARD, HEADINGS, STOP
+from avn.navigation.protocols import Protocol
+from avn.navigation.reward import RewardConfig
+from avn.navigation.starts import Starts
+from avn.navigation.tables import Tables
+
+_KEPT = ("state", "start", "source", "walk", "sound", "take", "actions", "attempted", "collided")
+
+
+class World:
+    """N episodes, each with its source, sound and start.
+
+    Parameters
+    ----------
+    tables : Tables
+    starts : Starts
+        Where episodes begin.
+    n : int
+    protocol : Protocol
+        Which actions there are, and when an episode succeeds.
+    max_steps : int or None
+        Actions after which an episode is cut off; None for the limits of the protocol.
+    reward : RewardConfig
+    seed : int
+        Draws episodes and takes.
+
+    Attributes
+    ----------
+    state, start, source, sound, take : (N,) int64
+        Where the agents are and began, and what they hear.
+    walk : (N,) int64
+        The exploration walk of each episode, counted through all apartments.
+    actions, attempted : (N,) int64
+        Actions and attempted moves in the episode.
+    collided : (N,) bool
+        Whether the last action was a blocked move.
+    """
+
+    def __init__(
+        self,
+        tables: Tables,
+        starts: Starts,
+        n: int,
+        protocol: Protocol,
+        max_steps: int | None = None,
+        reward: RewardConfig | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.tables, self.starts, self.protocol = tables, starts, protocol
+        self.max_steps, self.n = max_steps, n
+        self.reward = reward or RewardConfig()
+        self.generator = torch.Generator().manual_seed(seed)
+        self.state, self.start, self.source, self.walk, self.sound, self.take = (
+            torch.zeros(n, dtype=torch.int64) for _ in range(6)
+        )
+        self.actions, self.attempted = (torch.zeros(n, dtype=torch.int64) for _ in range(2))
+        self.collided = torch.zeros(n, dtype=torch.bool)
+        self.begin(torch.ones(n, dtype=torch.bool))
+
+    def begin(self, rows: Tensor) -> None:
+        """Begin new episodes in some rows, (N,) bool; draws for all, so that rows do not matter."""
+        source, walk, start = self.starts.draw(self.n, self.generator)
+        sound = torch.randint(self.tables.sounds, (self.n,), generator=self.generator)
+        walk = self.tables.source_room[source] * self.starts.walks + walk
+        self.source = torch.where(rows, source, self.source)
+        self.walk = torch.where(rows, walk, self.walk)
+        self.start = torch.where(rows, start, self.start)
+        self.state = torch.where(rows, start, self.state)
+        self.sound = torch.where(rows, sound, self.sound)
+        self.actions = self.actions.masked_fill(rows, 0)
+        self.attempted = self.attempted.masked_fill(rows, 0)
+        self.collided = self.collided & ~rows
+        self._draw_takes(rows)
+
+    def step(self, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Move every agent by one action.
+
+        Parameters
+        ----------
+        actions : (N,) int64
+            See `avn.core.actions`.
+
+        Returns
+        -------
+        reward : (N,) float32
+        terminated, truncated : (N,) bool
+            Whether the episode ended by itself, or was cut off.
+        """
+        following = self.tables.following[self.state * ACTIONS + actions]
+        moving = actions <= BACKWARD
+        self.collided = moving & (following == self.state)
+        self.state = following
+        self.actions = self.actions + 1
+        self.attempted = self.attempted + moving
+        arrived = self.tables.goal[self.tables.goal_row[self.source] + following]
+        if self.protocol.says_stop:
+            terminated = actions == STOP
+            success = arrived & terminated
+        else:
+            terminated = success = arrived
+        self._draw_takes()
+        truncated = self._out_of_time() & ~terminated
+        reward = torch.where(self.collided, self.reward.collision, self.reward.step)
+        return torch.where(success, self.reward.success, reward), terminated, truncated
+
+    def clip(self) -> Tensor:
+        """The row of the clip that each agent hears now, (N,) int64."""
+        tables = self.tables
+        clip = tables.clip_row[self.source] + self.state * tables.clips_of_state
+        return clip + self.sound * tables.takes + self.take
+
+    def odometry(self) -> Tensor:
+        """Cells to the right and to the front and quarter turns since the start, (N, 3) int64."""
+        frame = self.start % HEADINGS * self.tables.states
+        return self.tables.places[frame + self.state] - self.tables.places[frame + self.start]
+
+    def state_dict(self) -> dict[str, Any]:
+        """All that goes on changing."""
+        kept: dict[str, Any] = {name: getattr(self, name).clone() for name in _KEPT}
+        return kept | {"generator": self.generator.get_state()}
+
+    def load_state_dict(self, kept: dict[str, Any]) -> None:
+        """Go on where `state_dict` was taken."""
+        for name in _KEPT:
+            setattr(self, name, kept[name].clone())
+        self.generator.set_state(kept["generator"])
+
+    def _draw_takes(self, rows: Tensor | None = None) -> None:
+        """Let every agent, or those of some rows, hear another take."""
+        if self.tables.takes > 1:
+            takes = torch.randint(self.tables.takes, (self.n,), generator=self.generator)
+            self.take = takes if rows is None else torch.where(rows, takes, self.take)
+
+    def _out_of_time(self) -> Tensor:
+        """Whose episodes are cut off after this action, (N,) bool."""
+        if self.max_steps is not None:
+            return self.actions >= self.max_steps
+        out = self.actions >= self.protocol.max_actions
+        if self.protocol.moves_factor is None:
+            return out
+        moves = self.tables.moves[self.tables.goal_row[self.source] + self.start]
+        return out | (self.attempted >= torch.ceil(self.protocol.moves_factor * moves))

@@ -1,0 +1,89 @@
+"""What was to be seen and heard at each step of a trace, for films and pages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from avn.acoustics.clips import CLIP_SAMPLES, FADE_SAMPLES, ClipRenderer, DrySounds, brir_spectra
+from avn.acoustics.dry_sounds import load_sounds
+from avn.dataset.scene import Scene
+from avn.navigation.trace import Trace
+from avn.pipeline import audio_inference, scenes
+from avn.pipeline.replay import Run
+
+# Clips rendered at once.
+_BATCH = 64
+
+
+class Perceived:
+    """Pictures and clips of a run's apartments, made where they are missing.
+
+    Agents that do not see or hear stand at the same places: the pictures are what they would have
+    seen, and the clips what they would have heard.
+
+    Parameters
+    ----------
+    run : Run
+    """
+
+    def __init__(self, run: Run) -> None:
+        cfg = run.cfg
+        self._regime = str(cfg.acoustics.name)
+        scenes.scenes(cfg, (cfg.part,), audible=True)
+        seen = scenes.seen_scenes(cfg, (cfg.part,))[cfg.part]
+        hashes = scenes.views_hashes(cfg, (cfg.part,))[cfg.part]
+        self._scenes: dict[str, Scene] = {room.name: room for room in seen}
+        self._views = {
+            room.name: room.views(cfg.renderer.name, made_from).rgb
+            for room, made_from in zip(seen, hashes, strict=True)
+        }
+        sounds = DrySounds(load_sounds(audio_inference.sound_files(cfg)))
+        # the clips of `avn.pipeline.sound_network.hearing`: same microphone, seed and purpose
+        self._renderer = ClipRenderer(
+            sounds, scenes.typed(cfg.microphone), audio_inference.HEARING_SEED, "eval"
+        )
+
+    def views(self, room: str, states: Sequence[int] | NDArray[np.int64]) -> NDArray[np.uint8]:
+        """First-person views of some states of a room, (N, H, W, 3) uint8."""
+        return np.stack([self._views[room][int(state)] for state in states])
+
+    def clips(self, trace: Trace) -> Tensor:
+        """What is heard at each step, (T + 1, 2, 16000) float32, left and right ear."""
+        brirs = self._scenes[trace.place.name].brirs(self._regime)
+        state, take = torch.from_numpy(trace.state), torch.from_numpy(trace.take)
+        parts = []
+        for states, takes in zip(state.split(_BATCH), take.split(_BATCH), strict=True):
+            source = torch.full_like(states, trace.source)
+            sound = torch.full_like(states, trace.sound)
+            spectra = brir_spectra(brirs.gather(source, states))
+            parts.append(self._renderer.render(spectra, source, states, sound, takes))
+        return torch.cat(parts)
+
+
+def soundtrack(clips: Tensor) -> NDArray[np.float32]:
+    """Clips one after the other, a second each, without a click where they meet.
+
+    Each clip is periodic, so that it goes on for 10 ms while the next one is faded in over it.
+
+    Parameters
+    ----------
+    clips : (T, 2, 16000) float32 tensor
+
+    Returns
+    -------
+    (16000 T, 2) float32
+        Left and right; one factor for all brings the peak to 0.9, so that it grows louder on the
+        way to the source.
+    """
+    sound = clips.clone()
+    rise = (torch.arange(FADE_SAMPLES) + 1) / (FADE_SAMPLES + 1)
+    begun = clips[1:, :, :FADE_SAMPLES] * rise
+    sound[1:, :, :FADE_SAMPLES] = begun + clips[:-1, :, :FADE_SAMPLES] * (1 - rise)
+    track = sound.permute(0, 2, 1).reshape(len(clips) * CLIP_SAMPLES, 2)
+    scaled: NDArray[np.float32] = (track * (0.9 / track.abs().max().clamp_min(1e-9))).numpy()
+    return scaled

@@ -1,0 +1,84 @@
+"""How far what a run's agent hears, sees and recognises lies from the truth, beside its records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import torch
+from numpy.typing import NDArray
+from omegaconf import DictConfig
+from torch import Tensor
+
+from avn.dataset.scene import Scene
+from avn.mapping.place_errors import place_errors
+from avn.pipeline import audio_inference, occupancy
+from avn.pipeline.audio_inference import sound_errors
+from avn.reporting import perception_tables, results
+from avn.reporting.table import wide_console
+
+HEARD, SEEN, PLACES = "hearing.csv", "windows.csv", "places.csv"
+TABLES = {
+    HEARD: perception_tables.heard_table,
+    SEEN: perception_tables.windows_table,
+    PLACES: perception_tables.places_table,
+}
+
+
+def write(
+    cfg: DictConfig,
+    rooms: Sequence[Scene],
+    walks: Sequence[NDArray[np.int64]],
+    hearing: Sequence[Mapping[str, Tensor]],
+    sights: Sequence[Mapping[str, Tensor]],
+    folder: Path,
+) -> None:
+    """Write a table for each thing that a network tells the agent of the rooms.
+
+    Parameters
+    ----------
+    walks : sequence of (W, T) int64
+        Exploration walks in each room, as states.
+    hearing, sights : sequences of mappings of str to tensor
+        What is heard and seen in each room; see `avn.pipeline.observations`.
+    """
+    if hearing and "sound" in hearing[0] and "location" not in cfg.agent.truth:
+        heard = [own["sound"] for own in hearing]
+        results.write_csv(_heard(cfg, rooms, heard), folder / HEARD)
+    if sights and "window" in sights[0] and "window" not in cfg.agent.truth:
+        seen = occupancy.window_errors(cfg, rooms, occupancy.windows(cfg, rooms))
+        results.write_csv(seen, folder / SEEN)
+    if sights and "feature" in sights[0] and "top" in cfg.mapper:
+        features = [own["feature"] for own in sights]
+        results.write_csv(_places(cfg, rooms, walks, features), folder / PLACES)
+
+
+def show(folder: Path) -> None:
+    """Print the tables of a run's folder."""
+    console = wide_console()
+    for name, table in TABLES.items():
+        if (folder / name).is_file():
+            console.print(table(results.read_csv(folder / name)))
+            console.print()
+
+
+def _heard(cfg: DictConfig, rooms: Sequence[Scene], heard: Sequence[Tensor]) -> pd.DataFrame:
+    names = tuple(audio_inference.sound_files(cfg))
+    errors = [sound_errors(room, own, names) for room, own in zip(rooms, heard, strict=True)]
+    return pd.concat(errors, ignore_index=True).assign(acoustics=cfg.acoustics.name)
+
+
+def _places(
+    cfg: DictConfig,
+    rooms: Sequence[Scene],
+    walks: Sequence[NDArray[np.int64]],
+    features: Sequence[Tensor],
+) -> pd.DataFrame:
+    found = []
+    for room, own, seen in zip(rooms, walks, features, strict=True):
+        lattice = torch.from_numpy(room.grid.lattice).long()
+        found.append(place_errors(lattice, seen, torch.from_numpy(own), cfg.mapper.top))
+        found[-1].insert(0, "room", room.name)
+    return pd.concat(found, ignore_index=True)

@@ -1,0 +1,262 @@
+"""Finished runs, walked again from their own config, so that pictures show what happened in them.
+
+Runs are deterministic: a run that cannot be walked again to the very same records was made by
+other code, and is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from omegaconf import DictConfig
+
+from avn.agents.recorder import Recorder
+from avn.agents.rollout import Watch
+from avn.core.errors import UserError
+from avn.dataset.scene import Scene
+from avn.navigation.trace import Trace
+from avn.pipeline import observations, scenes
+from avn.pipeline.run import read_run, run_hash, walk_rooms, wanted_by
+
+# Settings that a run is named by where it differs in them from the others.
+_TELLING = ("protocol", "acoustics", "look", "localisation", "exploration", "seed", "train_seed")
+_OTHER = "the run is of another version of avn or of its networks: run avn.eval again"
+SHOWS = ("typical", "success", "failure")
+
+
+@dataclass
+class Run:
+    """A finished run.
+
+    Attributes
+    ----------
+    folder : Path
+    cfg : DictConfig
+    results, episodes : DataFrame
+        `results.csv` and `episodes.csv`.
+    """
+
+    folder: Path
+    cfg: DictConfig
+    results: pd.DataFrame
+    episodes: pd.DataFrame
+    _rooms: list[Scene] = field(default_factory=list)
+
+    @property
+    def rooms(self) -> list[Scene]:
+        """The scenes that were walked."""
+        if not self._rooms:
+            self._rooms = scenes.scenes(self.cfg, (self.cfg.part,))[self.cfg.part]
+        return self._rooms
+
+
+def open_run(folder: Path, cfg: DictConfig) -> Run:
+    """Read a finished run from its folder.
+
+    Parameters
+    ----------
+    folder : Path
+        `outputs/eval/<agent>/<sounds>/<run>`.
+    cfg : DictConfig
+        Its config; see `avn.config.saved.read_config`.
+
+    Raises
+    ------
+    UserError
+        Where its records are missing or damaged.
+    """
+    return Run(folder, cfg, *read_run(folder))
+
+
+def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
+    """Rows of `episodes.csv` that are worth showing.
+
+    Parameters
+    ----------
+    episodes : DataFrame
+        Records of one run, or some of them.
+    show : {"typical", "success", "failure"}
+        Those nearest to the median SPL; those that succeeded by their SPL nearest to the median
+        of these; those that failed, by how far from the source they ended.
+    count : int
+        At most so many, as far apart in sounds and rooms as there are.
+
+    Returns
+    -------
+    list of int
+        Index labels of `episodes`, the fittest first.
+    """
+    if show not in SHOWS:
+        raise UserError(f"--show: '{show}' is none of {', '.join(SHOWS)}")
+    chosen = episodes
+    if show != "typical":
+        chosen = episodes[episodes["success"] == (show == "success")]
+    if not len(chosen) or count < 1:
+        return []
+    figure = "dtg" if show == "failure" else "spl"
+    off = (chosen[figure] - chosen[figure].median()).abs()
+    # of equals the one whose source is as far away as usual, for it is neither easy nor odd
+    far = (chosen["geodesic"] - episodes["geodesic"].median()).abs()
+    ranked = chosen.assign(off=off, far=far).sort_values(["off", "far"], kind="stable")
+    ranked["round"] = ranked.groupby(["room", "sound"]).cumcount()
+    ranked["room_round"] = ranked.groupby(["round", "room"]).cumcount()
+    ranked = ranked.sort_values(["round", "room_round", "off", "far"], kind="stable")
+    return [int(label) for label in ranked.index[:count]]
+
+
+def same_episodes(run: Run, labels: Sequence[int], other: Run) -> list[int]:
+    """Rows of another run's `episodes.csv` with the same episodes.
+
+    Raises
+    ------
+    UserError
+        Where the other run did not walk them.
+    """
+    where = dict(zip(episode_keys(other.episodes), other.episodes.index, strict=True))
+    wanted = episode_keys(run.episodes.loc[list(labels)])
+    if not set(wanted) <= set(where):
+        raise UserError(
+            f"{other.folder}: walked other episodes than {run.folder}; give runs with the same "
+            "split, protocol, sound and seed"
+        )
+    return [int(where[row]) for row in wanted]
+
+
+def episode_keys(episodes: pd.DataFrame) -> list[tuple[Any, ...]]:
+    """What tells which episode a record is of, whoever walked it."""
+    keys = ["room", "sound", "seed", "episode", "source_cell", "start_cell", "start_heading"]
+    return [tuple(row) for row in episodes[keys].itertuples(index=False)]
+
+
+def names_of(runs: Sequence[Run]) -> list[str]:
+    """Names that tell runs apart: the agent, and those settings in which they differ."""
+    settings = [_flat(run.cfg) for run in runs]
+    keys = [key for key in settings[0] if len({own.get(key) for own in settings}) > 1]
+    shown = [key for key in keys if key.split(".")[0] in _TELLING]
+    names = []
+    for run, own in zip(runs, settings, strict=True):
+        parts = [f"{key.removesuffix('.name')}={own[key]}" for key in shown if key in own]
+        names.append(", ".join((str(run.cfg.agent.name), *parts)))
+    if len(set(names)) < len(names):  # settings of networks or of rooms
+        names = [f"{name} ({run.folder.name})" for name, run in zip(names, runs, strict=True)]
+    return names
+
+
+def settings_but_seed(run: Run) -> str:
+    """All settings of a run that make its records, but for the seed of its episodes."""
+    machine = ("seed", "outputs", "processes", "auto", "film", "film_show")
+    own = _flat(run.cfg)
+    return repr(sorted((key, value) for key, value in own.items() if key not in machine))
+
+
+def _flat(node: Any, path: str = "") -> dict[str, str]:
+    """A config as dotted keys and texts."""
+    if isinstance(node, DictConfig):
+        parts = (_flat(node[key], f"{path}.{key}" if path else key) for key in map(str, node))
+        return {key: value for part in parts for key, value in part.items()}
+    return {path: str(node)}
+
+
+def traces(run: Run, labels: Sequence[int], thoughts: bool = True) -> list[Trace]:
+    """Walk a run again, in the rooms of some episodes, and keep their traces.
+
+    Parameters
+    ----------
+    run : Run
+    labels : sequence of int
+        Rows of `episodes.csv`.
+    thoughts : bool
+        Whether what an agent with a map took to be true is kept too.
+
+    Raises
+    ------
+    UserError
+        Where the walk is another than the one that the run recorded.
+    """
+    (found,) = walk_again(run, [(labels, thoughts)])
+    return found
+
+
+def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[list[Trace]]:
+    """As `traces`, of several choices in one walk."""
+    asked = list(wanted)
+    names = set(run.episodes.loc[[label for labels, _ in asked for label in labels], "room"])
+    kept = [index for index, room in enumerate(run.rooms) if room.name in names]
+    # in a batch the episodes of a room stand in the order of its records
+    rows = run.episodes.groupby("room").cumcount()
+    recorders = [
+        Recorder(_by_room(run, rows, labels), run.cfg.takes, thoughts) for labels, thoughts in asked
+    ]
+
+    def watch(*step: Any) -> bool:
+        enough = [recorder(*step) for recorder in recorders]  # each of them sees every step
+        return all(enough)
+
+    # a run of another version must not set off the training of this version's networks
+    cfg = run.cfg.copy()
+    own = run.folder.resolve().name.endswith(run_hash(cfg)[:8])
+    cfg.auto = cfg.auto and own
+    try:
+        walked = _walk(cfg, run.rooms, kept, watch)
+    except UserError as error:
+        if own:
+            raise
+        raise UserError(f"{run.folder}: {_OTHER} ({error})") from error
+    _check_same(
+        run, pd.concat(walked, ignore_index=True), [own for part, _ in asked for own in part]
+    )
+    return [
+        [
+            recorder.trace(str(row["room"]), int(rows[label]), row)
+            for label, row in zip(labels, _records(run, labels), strict=True)
+        ]
+        for recorder, (labels, _) in zip(recorders, asked, strict=True)
+    ]
+
+
+def _walk(
+    cfg: DictConfig, rooms: Sequence[Scene], kept: Sequence[int], watch: Watch
+) -> list[pd.DataFrame]:
+    """Walk some of the rooms of a config, by number."""
+    observed = wanted_by(cfg)
+    hearing, sights = (
+        observations.heard(cfg, rooms, observed),
+        observations.seen(cfg, rooms, observed),
+    )
+    return walk_rooms(
+        cfg,
+        [rooms[i] for i in kept],
+        [hearing[i] for i in kept],
+        [sights[i] for i in kept],
+        watch,
+    )
+
+
+def _by_room(run: Run, rows: pd.Series, labels: Sequence[int]) -> dict[str, list[int]]:
+    own = run.episodes.loc[list(labels), "room"]
+    return {str(room): rows.loc[part.index].tolist() for room, part in own.groupby(own)}
+
+
+def _records(run: Run, labels: Sequence[int]) -> list[Mapping[str, Any]]:
+    found = run.episodes.loc[list(labels)].to_dict("records")
+    return [{**row, "row": int(label)} for label, row in zip(labels, found, strict=True)]  # type: ignore[dict-item]
+
+
+def _check_same(run: Run, walked: pd.DataFrame, labels: Sequence[int]) -> None:
+    """Raise `UserError` unless the episodes of `labels` went as the run's records say."""
+    keys = ["room", "sound", "episode"]
+    own = run.episodes.loc[sorted(set(labels))]
+    again = own[keys].merge(walked, on=keys, how="left")[list(own.columns)]
+    try:
+        pd.testing.assert_frame_equal(
+            again, own.reset_index(drop=True), check_dtype=False, rtol=1e-9
+        )
+    except AssertionError as error:
+        raise UserError(
+            f"{run.folder}: walked again, its episodes end otherwise than episodes.csv says: "
+            + _OTHER
+        ) from error

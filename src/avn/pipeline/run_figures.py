@@ -1,0 +1,95 @@
+"""Pictures of finished runs: trajectories, estimates, beliefs, memory, results by difficulty."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from torch.utils.tensorboard import SummaryWriter
+
+from avn.core.errors import UserError
+from avn.core.files import written_whole
+from avn.core.progress import tell
+from avn.navigation.trace import Trace
+from avn.pipeline import replay
+from avn.pipeline.replay import Run
+from avn.reporting.breakdown import breakdown_figure
+from avn.reporting.thought_figures import belief_figure, memory_figure
+from avn.reporting.trajectory_figures import estimate_figure, trajectory_figure
+
+FOLDER = "figures"
+_SUFFIX = ".figures"
+
+
+def draw_runs(runs: Sequence[Run], show: str, count: int, episodes: Sequence[int] | None) -> None:
+    """Write the pictures of some runs into the first one's folder and its TensorBoard.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Over the same episodes.
+    show, count : str, int
+        Which episodes are drawn, and how many; see `avn.pipeline.replay.choose`.
+    episodes : sequence of int, optional
+        Rows of the first run's `episodes.csv` to draw instead.
+
+    Raises
+    ------
+    UserError
+        Where a run lacks an episode.
+    """
+    first = runs[0]
+    labels = list(episodes or replay.choose(first.episodes, show, count))
+    if unknown := set(labels) - set(first.episodes.index):
+        raise UserError(f"--episode: {first.folder} has no row {min(unknown)} in episodes.csv")
+    names = replay.names_of(runs)
+    made = {
+        "breakdown": breakdown_figure(dict(zip(names, (r.episodes for r in runs), strict=True)))
+    }
+    if labels:
+        walked = [replay.traces(run, replay.same_episodes(first, labels, run)) for run in runs]
+        made |= episode_figures(walked, names)
+    else:
+        tell(f"{first.folder}: no episode to show (--show {show})")
+    write_figures(first.folder, made)
+
+
+def episode_figures(walked: Sequence[Sequence[Trace]], names: Sequence[str]) -> dict[str, Figure]:
+    """Pictures of episodes by name, of several runs over the same episodes.
+
+    Parameters
+    ----------
+    walked : sequence of sequences of Trace
+        By run and episode.
+    names : sequence of str
+        Of the runs.
+    """
+    made = {"trajectories": trajectory_figure(list(zip(*walked, strict=True)), names)}
+    kinds: tuple[tuple[str, Callable[[Trace, str], Figure]], ...] = (
+        ("estimates", estimate_figure),
+        ("belief", belief_figure),
+        ("memory", memory_figure),
+    )
+    for trace in walked[0]:
+        record = trace.record
+        for kind, draw in kinds:
+            try:
+                figure = draw(trace, names[0])
+            except ValueError:
+                continue  # an agent without this part
+            made[f"{kind}-{record['room']}-{record['sound']}-{record['episode']}"] = figure
+    return made
+
+
+def write_figures(folder: Path, made: dict[str, Figure]) -> None:
+    """Write pictures into a run's folder and its TensorBoard, in the place of older ones."""
+    for old in folder.glob(f"events.*{_SUFFIX}"):
+        old.unlink()
+    with SummaryWriter(str(folder), filename_suffix=_SUFFIX) as writer:
+        for name, figure in made.items():
+            path = folder / FOLDER / f"{name}.png"
+            with written_whole(path) as part:
+                figure.savefig(part, format="png", metadata={"Software": None})
+            tell(str(path))
+            writer.add_figure(f"figures/{name.replace('-', '/', 1)}", figure)

@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+import torch
+from drawn_walks import TAKES, flat, ours, simulator, walked
+from tensordict import TensorDict
+from torch import Tensor
+
+from avn.agents.greedy import Greedy
+from avn.agents.random_walk import RandomWalk
+from avn.agents.recorder import Recorder
+from avn.agents.rollout import walk
+from avn.core.actions import transitions
+from avn.mapping.memory_mapper import MemoryMapper
+
+
+def test_a_trace_is_the_walk_that_the_records_tell_of() -> None:
+    for trace in walked(Greedy()):
+        record, state = trace.record, trace.state
+        table = transitions(trace.place.grid.neighbours)
+        assert (table[state[:-1], trace.action] == state[1:]).all()
+        assert (state[0] // 4, state[0] % 4) == (record["start_cell"], record["start_heading"])
+        assert state[-1] // 4 == record["end_cell"]
+        assert len(trace.action) == record["actions"]
+        assert trace.collided.sum() == record["collisions"]
+        assert trace.goal.tolist() == trace.place.grid.centres[record["source_cell"]].tolist()
+        # Its ears are perfect here.
+        assert trace.heard is not None
+        np.testing.assert_allclose(trace.heard, np.tile(trace.goal, (len(state), 1)), atol=1e-5)
+        assert trace.thoughts is None
+        assert trace.walk is None
+
+
+def test_the_takes_are_those_that_the_simulator_lets_hear() -> None:
+    place = flat()
+    world = simulator(place)
+    # what is heard tells which take it is
+    takes = torch.arange(TAKES).float().expand(len(place.sources), 4 * place.grid.cells, 1, -1)
+    world._hear({"sound": torch.stack((takes, torch.zeros_like(takes)), dim=-1)})
+    told: list[Tensor] = []
+
+    class Ears(RandomWalk):
+        def act(self, observation: TensorDict) -> Tensor:
+            told.append(observation["sound"][:, 0])
+            return super().act(observation)
+
+    recorder = Recorder({"flat": [1, 4]}, TAKES, thoughts=False)
+    walk(Ears(), world, recorder)
+    for row in (1, 4):
+        trace = recorder.trace("flat", row, {})
+        heard = [int(step[row]) for step in told[: len(trace.action)]]
+        assert trace.take[:-1].tolist() == heard
+        assert len(set(heard)) > 1
+
+
+@pytest.mark.parametrize(
+    ("explores", "localisation"),
+    [(False, ""), (True, "retrieval"), (True, "retrieval+odometry")],
+)
+def test_beliefs_lie_where_the_apartment_lies(explores: bool, localisation: str) -> None:
+    agent = ours(explores, localisation) if explores else ours()
+    traces = walked(agent)
+    assert len({trace.state[0] % 4 for trace in traces}) > 1  # from starts that look elsewhere
+    for trace in traces:
+        thoughts = trace.thoughts
+        assert thoughts is not None
+        assert thoughts.free is not None
+        squares = trace.place.grid.lattice - thoughts.low
+        free = np.zeros(thoughts.free.shape[1:], dtype=bool)
+        free[squares[:, 1], squares[:, 0]] = True
+        for step, belief in enumerate(thoughts.free):
+            x, y = trace.place.grid.lattice[trace.state[step] // 4] - thoughts.low
+            if localisation != "retrieval":
+                assert belief[y, x] == 255
+            if not explores:  # what it saw is true
+                assert free[belief > 200].all()
+                assert not free[belief < 50].any()
+        if localisation != "retrieval":
+            np.testing.assert_allclose(thoughts.pose[:, :2], trace.path[:-1])
+            assert (thoughts.pose[:, 2] == trace.state[:-1] % 4).all()
+
+
+def test_the_memory_returns_the_very_place_where_it_was_before() -> None:
+    seen = 0
+    for trace in walked(ours(explores=True)):
+        thoughts = trace.thoughts
+        assert trace.walk is not None
+        assert thoughts is not None
+        assert thoughts.similarity is not None
+        assert thoughts.retrieved is not None
+        for step in np.flatnonzero(np.isin(trace.state[:-1], trace.walk)):
+            assert thoughts.similarity[step, 0] == 1
+            assert thoughts.retrieved[step, 0, :2].tolist() == trace.path[step].tolist()
+            assert thoughts.retrieved[step, 0, 2] == trace.state[step] % 4
+            seen += 1
+    assert seen
+
+
+def test_who_looks_on_changes_nothing_and_may_leave_early() -> None:
+    watched, alone = simulator(flat()), simulator(flat())
+    walk(ours(), alone)
+    recorder = Recorder({"flat": [0, 1]}, TAKES, thoughts=True)
+    calls = 0
+
+    def watch(*step: object) -> bool:
+        nonlocal calls
+        calls += 1
+        return recorder(*step)  # type: ignore[arg-type]
+
+    walk(ours(), watched, watch)
+    assert (watched.state[:2] == alone.state[:2]).all()
+    assert (watched.actions[:2] == alone.actions[:2]).all()
+    assert calls <= int(alone.actions.max()) + 1
+    other = simulator(flat())
+    walk(ours(), other, Recorder({"elsewhere": [0]}, TAKES, thoughts=True))
+    assert not other.actions.any()
+
+
+def test_a_mapper_without_pictures_of_its_beliefs_is_left_out() -> None:
+    class Blind(MemoryMapper):
+        def belief(self, rows: Tensor) -> None:  # type: ignore[override]
+            return None
+
+    agent = ours(explores=True)
+    agent.mapper = Blind(41)
+    trace = walked(agent, [2])[0]
+    assert trace.thoughts is not None
+    assert trace.thoughts.free is None
+    assert trace.thoughts.retrieved is not None

@@ -1,0 +1,181 @@
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from tensordict import TensorDict
+from torch import Tensor
+
+from avn.agents.base import Agent
+from avn.agents.greedy import Greedy
+from avn.agents.random_walk import RandomWalk
+from avn.agents.rollout import Labels, records, walk, walk_room
+from avn.core.errors import UserError
+from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
+from avn.navigation.place import DrawnPlace
+from avn.navigation.protocols import Protocol
+from avn.navigation.simulator import Simulator
+from avn.reporting.results import EPISODE_COLUMNS
+
+LABELS = Labels(agent="test", acoustics="resonance")
+
+
+class Forward(Agent):
+    """Walks straight on, and says Stop after a number of actions where it may."""
+
+    def __init__(self, steps: int = 1000) -> None:
+        self.steps = steps
+        self.seen: list[TensorDict] = []
+
+    def act(self, observation: TensorDict) -> Tensor:
+        self.seen.append(observation)
+        stops = self.protocol.says_stop and len(self.seen) > self.steps
+        return torch.full((self.n,), 4 if stops else 0)
+
+
+def row_of(frame: pd.DataFrame, cell: int, heading: int) -> pd.Series:
+    return frame[(frame["start_cell"] == cell) & (frame["start_heading"] == heading)].iloc[0]
+
+
+def test_records_under_var_by_hand(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
+    frame = walk_room(Forward(), corridor, episodes, protocols["var"], LABELS)
+    assert tuple(frame.columns) == EPISODE_COLUMNS
+    assert len(frame) == 36
+    arrived = row_of(frame, cell=4, heading=3)
+    assert arrived["outcome"] == "success"
+    assert (arrived["path"], arrived["shortest"], arrived["fewest_actions"]) == (3, 3, 3)
+    assert (arrived["spl"], arrived["softspl"], arrived["sna"]) == (1, 1, 1)
+    assert (arrived["geodesic"], arrived["euclidean"], arrived["dtg"]) == (2.0, 2.0, 0.5)
+    # East, against the end of the corridor until twice ten moves are attempted.
+    lost = row_of(frame, cell=10, heading=1)
+    assert (lost["outcome"], lost["path"], lost["collisions"]) == ("out_of_moves", 20, 20)
+    assert (lost["spl"], lost["softspl"], lost["sna"], lost["dtg"]) == (0, 0, 0, 5.0)
+    # Facing away it takes no turn: backward moves do. Facing north it takes one.
+    assert row_of(frame, cell=10, heading=1)["fewest_actions"] == 9
+    assert row_of(frame, cell=10, heading=0)["fewest_actions"] == 10
+
+
+def test_records_under_stop_by_hand(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    episodes = exhaustive_episodes(corridor, ["ring"], protocols["stop"], seed=0)
+    frame = walk_room(Forward(3), corridor, episodes, protocols["stop"], LABELS)
+    arrived = row_of(frame, cell=4, heading=3)
+    # Three of four moves to the source, 1.5 m of 2.0 m; two moves and Stop would have done.
+    assert (arrived["outcome"], arrived["path"], arrived["shortest"]) == ("success", 1.5, 2.0)
+    assert (arrived["actions"], arrived["fewest_actions"]) == (4, 3)
+    assert (arrived["spl"], arrived["softspl"], arrived["sna"]) == (1.0, 0.75, 0.75)
+    assert arrived["dtg"] == 0.5
+    short = row_of(frame, cell=8, heading=3)
+    assert (short["outcome"], short["dtg"], short["spl"]) == ("stopped_elsewhere", 2.5, 0.0)
+    assert short["softspl"] == pytest.approx(1.5 / 4.0)
+
+
+def test_out_of_actions(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    episodes = exhaustive_episodes(corridor, ["ring"], protocols["stop"], seed=0)
+    frame = walk_room(Forward(), corridor, episodes, protocols["stop"], LABELS)
+    assert set(frame["outcome"]) == {"out_of_actions"}
+    assert set(frame["actions"]) == {500}
+
+
+def test_records_name_sight_rooms_and_sounds(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    episodes = frozen_episodes(two_rooms, ["ring", "clock"], protocols["var"], seed=5)
+    frame = walk_room(RandomWalk(), two_rooms, episodes, protocols["var"], LABELS)
+    assert len(frame) == 2 * 2 * 20
+    assert frame["sound"].value_counts().to_dict() == {"ring": 40, "clock": 40}
+    assert set(frame["seed"]) == {5}
+    other_room = (
+        two_rooms.grid.rooms[frame["start_cell"]] != two_rooms.grid.rooms[frame["source_cell"]]
+    )
+    assert (frame["rooms_crossed"].to_numpy() > 0).tolist() == other_room.tolist()
+    seen = two_rooms.in_sight[frame["source"], frame["start_cell"]]
+    assert (frame["in_sight"].to_numpy() == seen).all()
+    assert (frame["geodesic"] >= frame["euclidean"] - 1e-9).all()
+
+
+def test_same_seed_same_records(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+    rules = protocols["var"]
+    first, again, other = (
+        walk_room(
+            RandomWalk(),
+            two_rooms,
+            frozen_episodes(two_rooms, ["ring"], rules, seed),
+            rules,
+            LABELS,
+        )
+        for seed in (0, 0, 1)
+    )
+    pd.testing.assert_frame_equal(first, again)
+    assert not first.equals(other)
+
+
+class Curious(Agent):
+    """Not privileged; it keeps whatever it is given."""
+
+    def __init__(self) -> None:
+        self.given: list[object] = []
+
+    def act(self, observation: TensorDict) -> Tensor:
+        self.given.append(observation)
+        return torch.randint(4, (self.n,), generator=self.generator)
+
+
+def test_unprivileged_agents_get_observations_alone(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    episodes = frozen_episodes(two_rooms, ["ring"], protocols["stop"], seed=0)
+    simulator = Simulator(
+        two_rooms, episodes, protocols["stop"], {"sound": torch.rand(2, 204, 1, 1, 2)}
+    )
+    agent = Curious()
+    walk(agent, simulator)
+    assert set(vars(agent)) == {"given", "n", "generator", "protocol"}
+    assert len(agent.given) == 500
+    for given in agent.given:
+        assert isinstance(given, TensorDict)
+        assert set(given.keys()) == {"sound", "collided", "odometry"}
+    with pytest.raises(PermissionError, match="may not see the truth"):
+        agent.reveal(simulator)
+
+
+def renumbered(place: DrawnPlace, order: np.ndarray) -> DrawnPlace:
+    """The same apartment, its cells numbered in another order: new cell i was `order[i]`."""
+    grid, back = place.grid, np.append(np.argsort(order), -1).astype(np.int32)
+    other = type(grid)(
+        lattice=grid.lattice[order],
+        neighbours=back[grid.neighbours[order]],
+        distances=grid.distances[np.ix_(order, order)],
+        rooms=grid.rooms[order],
+        squares=grid.squares,
+    )
+    return DrawnPlace(place.name, other, back[place.sources], place.in_sight[:, order])
+
+
+@pytest.mark.parametrize("agent", [RandomWalk(), Greedy()], ids=["random_walk", "greedy"])
+def test_agents_do_not_know_the_numbers_of_states(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol], agent: Agent
+) -> None:
+    rules = protocols["stop"]
+    order = np.random.default_rng(0).permutation(51)
+    other = renumbered(two_rooms, order)
+    states = (4 * order[:, None] + np.arange(4)).reshape(-1)
+    hearing = 4 * torch.randn(2, 204, 1, 1, 2, generator=torch.Generator().manual_seed(0))
+    episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
+    moved = type(episodes)(**{**vars(episodes), "start": np.argsort(states)[episodes.start]})
+    first = Simulator(two_rooms, episodes, rules, {"sound": hearing})
+    second = Simulator(other, moved, rules, {"sound": hearing[:, states]})
+    walk(agent, first)
+    walk(agent, second)
+    assert (torch.from_numpy(states)[second.state] == first.state).all()
+    assert (first.state != first.start).any()
+    columns = ["success", "path", "actions", "collisions", "spl", "softspl", "sna", "dtg"]
+    frames = [records(simulator, LABELS)[columns] for simulator in (first, second)]
+    pd.testing.assert_frame_equal(*frames)
+
+
+def test_an_agent_without_what_it_needs_is_refused(
+    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+) -> None:
+    episodes = frozen_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
+    with pytest.raises(UserError, match=r"needs the observation 'sound'.*sound_model"):
+        walk_room(Greedy(), two_rooms, episodes, protocols["var"], LABELS)

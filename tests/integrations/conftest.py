@@ -1,0 +1,5 @@
+"""The small world that the tests of this folder walk through."""
+
+from small_worlds import flat, rules
+
+__all__ = ["flat", "rules"]

@@ -1,0 +1,133 @@
+import numpy as np
+import pytest
+import torch
+from small_worlds import make_walks, random_tables
+
+from avn.navigation.episodes import Episodes
+from avn.navigation.place import draw
+from avn.navigation.protocols import Protocol
+from avn.navigation.simulator import Simulator
+from avn.navigation.starts import build_starts
+from avn.navigation.world import World
+
+STOP_RULES = Protocol("stop", "radius", True, "walked")
+SECOND = "aaaa\naBaa\naaaA\naa.a"
+
+
+@pytest.mark.parametrize("says_stop", [False, True])
+def test_the_world_moves_and_ends_as_the_simulator_does(flat, rules, says_stop):
+    protocol = STOP_RULES if says_stop else rules
+    places = [draw("second", SECOND), flat]  # the second place's numbers are shifted
+    tables = random_tables(places, protocol)
+    world = World(tables, build_starts(tables), 200, protocol, seed=3)
+    here = tables.source_room[world.source] == 1
+    shift, first_source = int(tables.first_state[1]), int((tables.source_room == 0).sum())
+    episodes = Episodes(
+        room="flat",
+        seed=0,
+        sounds=("one", "two"),
+        number=np.arange(int(here.sum())),
+        sound=world.sound[here].numpy(),
+        source=world.source[here].numpy() - first_source,
+        start=world.state[here].numpy() - shift,
+        walks=np.empty((0, 1), dtype=np.int64),
+        walk=np.full(int(here.sum()), -1),
+    )
+    simulator = Simulator(flat, episodes, protocol)
+    generator = torch.Generator().manual_seed(1)
+    for _ in range(25):
+        actions = torch.randint(protocol.actions, (200,), generator=generator)
+        was_done = simulator.done.clone()
+        reward, terminated, truncated = world.step(actions)
+        observation = simulator.step(actions[here])
+        running = ~was_done
+        assert torch.equal(world.state[here][running] - shift, simulator.state[running])
+        done = (terminated | truncated)[here]
+        assert torch.equal(done[running], simulator.done[running])
+        assert torch.equal(world.collided[here][running], observation["collided"][running])
+        assert torch.equal(world.odometry()[here][running], observation["odometry"][running])
+        success = (reward[here] == 10.0) & running
+        assert torch.equal(success, simulator.success & running)
+
+
+def test_rewards_are_ten_for_success_and_a_tenth_off_for_a_collision(rules):
+    place = draw("row", "aaaaaA")
+    tables = random_tables([place], rules)
+    world = World(tables, build_starts(tables), 3, rules, max_steps=50)
+    east, north = 1, 0
+    world.state = torch.tensor([4 * 2 + east, 4 * 3 + east, 4 * 3 + north])
+    reward, terminated, truncated = world.step(torch.tensor([0, 0, 0]))
+    assert reward.tolist() == pytest.approx([-0.01, 10.0, -0.1])
+    assert terminated.tolist() == [False, True, False]
+    assert not truncated.any()
+
+
+def test_a_training_episode_is_cut_off_after_its_steps_and_counts_as_truncated(flat, rules):
+    tables = random_tables([flat], rules)
+    world = World(tables, build_starts(tables), 50, rules, max_steps=7)
+    turn = torch.full((50,), 2)
+    for step in range(7):
+        _, terminated, truncated = world.step(turn)
+        assert not terminated.any()
+        assert bool(truncated.all()) == (step == 6)
+
+
+def test_episodes_begin_everywhere_but_at_the_goal_and_equally_often(flat, rules):
+    tables = random_tables([draw("second", SECOND), flat], rules)
+    starts = build_starts(tables)
+    source, _, state = starts.draw(60_000, torch.Generator().manual_seed(0))
+    assert not tables.goal[tables.goal_row[source] + state].any()
+    assert torch.equal(tables.room[state], tables.source_room[source])
+    share = torch.bincount(source) / len(source)
+    assert share.numpy() == pytest.approx(1 / len(share), abs=0.01)
+    own = state[source == 0]
+    assert len(own.unique()) == int(starts.count[0])  # every start comes
+
+
+def test_a_start_was_not_visited_by_the_walk_of_its_episode(flat, rules):
+    tables = random_tables([flat], rules)
+    walks = make_walks(tables, walks=4, steps=12)
+    visited = torch.zeros(1, 4, tables.states, dtype=torch.bool)
+    for walk in range(4):
+        visited[0, walk, walks[0, walk]] = True
+    starts = build_starts(tables, visited)
+    source, walk, state = starts.draw(5000, torch.Generator().manual_seed(0))
+    assert not visited[tables.source_room[source], walk, state].any()
+
+
+def test_the_clip_that_is_heard_is_that_of_source_state_sound_and_take(flat, rules):
+    places = [draw("second", SECOND), flat]
+    tables = random_tables(places, rules)
+    world = World(tables, build_starts(tables), 64, rules, seed=2)
+    generator = torch.Generator().manual_seed(0)
+    hearing = []
+    for place in places:  # the very numbers of `random_tables`
+        states, sources = 4 * len(place.grid.lattice), len(place.sources)
+        hearing.append(torch.randn(sources, states, 2, 3, 6, generator=generator))
+        torch.rand(states, 5, 5, generator=generator)
+        torch.randn(states, 8, generator=generator)
+    heard = tables.hearing["sound_feature"][world.clip()]
+    for row in range(64):
+        room = int(tables.room[world.state[row]])
+        source = int(world.source[row]) - int((tables.source_room < room).sum())
+        state = int(world.state[row] - tables.first_state[room])
+        expected = hearing[room][source, state, world.sound[row], world.take[row]]
+        assert torch.equal(heard[row], expected)
+
+
+def test_a_world_goes_on_where_its_state_was_taken(flat, rules):
+    tables = random_tables([flat], rules)
+    world, other = (World(tables, build_starts(tables), 8, rules, 9, seed=s) for s in (1, 2))
+    actions = torch.randint(4, (30, 8), generator=torch.Generator().manual_seed(0))
+
+    def go(which, some):
+        seen = []
+        for own in some:
+            _, terminated, truncated = which.step(own)
+            which.begin(terminated | truncated)
+            seen.append(torch.stack((which.state, which.clip())))
+        return torch.stack(seen)
+
+    go(world, actions[:15])
+    other.load_state_dict(world.state_dict())
+    assert torch.equal(go(world, actions[15:]), go(other, actions[15:]))

@@ -1,0 +1,142 @@
+"""Finished runs of the mini split, walked again."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import torch
+from hydra import compose, initialize_config_dir
+from omegaconf import OmegaConf
+from small import A3C, EYES, SMALL
+
+from avn.config.folder import conf_folder
+from avn.config.saved import read_config
+from avn.config.schema import register
+from avn.core.errors import UserError
+from avn.pipeline import replay, sound_network
+from avn.pipeline.observed import Perceived
+from avn.pipeline.run import run_folder_name, run_hash
+from avn.reporting.results import write_csv
+
+
+def open_run(folder):
+    return replay.open_run(folder, read_config(folder))
+
+
+def made(command, outputs, agent, *more):
+    eyes = EYES if agent == "ours_noexp" or agent.endswith("mapper") else ()
+    eyes += A3C if agent.startswith("a3c") else ()
+    code, out, err = command("eval", f"agent={agent}", *SMALL, *eyes, f"outputs={outputs}", *more)
+    assert code == 0, err
+    return Path(out[-1])
+
+
+@pytest.mark.parametrize(
+    "agent", ["random_walk", "greedy", "a3c_va_m_mapper", "ours_noexp", "ours_exp"]
+)
+def test_a_run_is_walked_again_from_its_own_config(command, outputs, agent):
+    folder = made(command, outputs, agent)
+    run = open_run(folder)
+    # nothing of the config was lost: what it makes has the same name
+    assert run_folder_name(run.cfg) == folder.relative_to(outputs / "eval").as_posix()
+    labels = [0, 3, len(run.episodes) - 1]
+    traces = replay.traces(run, labels)
+    for label, trace in zip(labels, traces, strict=True):
+        row = run.episodes.loc[label]
+        assert trace.record["row"] == label
+        assert trace.state[-1] // 4 == row["end_cell"]
+        assert len(trace.action) == row["actions"]
+    # what an actor-critic agent hears is a feature, no place, and its map is its own affair
+    assert (traces[0].heard is None) == (agent not in ("greedy", "ours_noexp", "ours_exp"))
+    assert (traces[0].thoughts is None) == (not agent.startswith("ours"))
+    assert (traces[0].walk is None) == (agent not in ("ours_exp", "a3c_va_m_mapper"))
+
+
+@pytest.mark.parametrize("row", sorted(path.stem for path in (conf_folder() / "agent").iterdir()))
+def test_a_config_that_was_written_and_read_makes_the_same(row):
+    register()
+    with initialize_config_dir(str(conf_folder()), version_base="1.3"):
+        cfg = compose("eval", [f"agent={row}", "split=mini", "sound=clock", "planner.detour=3"])
+    again = replay._typed(OmegaConf.create(OmegaConf.to_yaml(cfg, resolve=True)))
+    assert OmegaConf.to_container(again) == OmegaConf.to_container(cfg, resolve=True)
+    assert run_hash(again) == run_hash(cfg)
+
+
+def test_the_clips_of_a_trace_are_those_that_the_network_heard(command, outputs):
+    run = open_run(made(command, outputs, "greedy"))
+    model, _ = sound_network.sound_model(run.cfg)
+    perceived = Perceived(run)
+    for trace in replay.traces(run, [1, len(run.episodes) - 2]):
+        with torch.inference_mode():
+            heard = model.eval()(perceived.clips(trace))
+        heading, here = trace.state % 4, trace.path
+        right, front = heard.double().unbind(1)
+        east = torch.stack((right, front, -right, -front))[heading, torch.arange(len(here))]
+        north = torch.stack((front, -right, -front, right))[heading, torch.arange(len(here))]
+        found = here + torch.stack((east, north), dim=1).numpy()
+        assert abs(found - trace.heard).max() < 1e-3
+
+
+def test_records_of_another_making_are_refused(command, outputs):
+    folder = made(command, outputs, "greedy", "seed=3")
+    path = folder / "episodes.csv"
+    whole = path.read_bytes()
+    run = open_run(folder)
+    try:
+        episodes = run.episodes.copy()
+        episodes.loc[0, "end_cell"] += 1
+        write_csv(episodes, path)
+        with pytest.raises(UserError, match=r"walked again, its episodes end otherwise"):
+            replay.traces(open_run(folder), [0])
+    finally:
+        path.write_bytes(whole)
+
+
+def test_a_run_of_another_version_sets_off_no_training(command, outputs, monkeypatch):
+    folder = made(command, outputs, "greedy")
+    monkeypatch.setitem(sound_network.VERSIONS, "sound_cnn", 99)
+    before = set((outputs / "train").iterdir())
+    with pytest.raises(UserError, match=r"of another version of avn .* is missing and auto=false"):
+        replay.traces(open_run(folder), [0])
+    assert set((outputs / "train").iterdir()) == before
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(UserError, match=r"no run's folder, it has no config.yaml"):
+        open_run(tmp_path)
+
+
+def episodes() -> pd.DataFrame:
+    rows = [
+        ("a", "ring", 1, 1.0, 0.0, 4.0),
+        ("a", "ring", 1, 0.5, 0.5, 6.0),
+        ("a", "clock", 0, 0.0, 3.0, 6.0),
+        ("b", "ring", 1, 0.6, 0.5, 6.0),
+        ("b", "ring", 0, 0.0, 9.0, 9.0),
+        ("b", "clock", 1, 0.5, 0.5, 9.0),
+    ]
+    columns = ["room", "sound", "success", "spl", "dtg", "geodesic"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_what_is_chosen_is_typical_and_from_everywhere():
+    chosen = replay.choose(episodes(), "typical", 2)
+    assert chosen[0] == 1  # of the median SPL, and as far away as most
+    assert set(episodes().loc[chosen, "room"]) == {"a", "b"}
+    assert set(replay.choose(episodes(), "success", 9)) == {0, 1, 3, 5}
+    assert set(replay.choose(episodes(), "failure", 9)) == {2, 4}
+    assert replay.choose(episodes()[episodes()["success"] == 1], "failure", 2) == []
+    assert replay.choose(episodes(), "typical", 0) == []
+    with pytest.raises(UserError, match="--show: 'best' is none of typical, success, failure"):
+        replay.choose(episodes(), "best", 1)
+
+
+def test_names_tell_runs_apart_by_what_differs(command, outputs):
+    one = open_run(made(command, outputs, "random_walk"))
+    other = open_run(made(command, outputs, "random_walk", "seed=1"))
+    third = open_run(made(command, outputs, "greedy"))
+    assert replay.names_of([one, third]) == ["random_walk", "greedy"]
+    assert replay.names_of([one, other]) == ["random_walk, seed=0", "random_walk, seed=1"]
+    with pytest.raises(UserError, match="walked other episodes"):
+        replay.same_episodes(one, [0], other)
+    assert replay.same_episodes(one, [2, 0], third) == [2, 0]
