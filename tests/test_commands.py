@@ -328,13 +328,19 @@ def test_a_refused_run_leaves_nothing_behind(command, tmp_path):
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_a_key_of_a_part_that_is_null_is_named(command, tmp_path):
-    options = ("agent=greedy", "split=mini", f"outputs={tmp_path}", "mapper.network.epochs=1")
+def test_a_key_of_a_value_is_named(command, tmp_path):
+    options = ("agent=greedy", "split=mini", f"outputs={tmp_path}", "split.folder.x=1")
     code, _, err = command("eval", *options)
     assert code == 2
-    assert err == [
-        "avn.eval: mapper.network.epochs: 'mapper.network' is null in this config; leave it out"
-    ]
+    assert len(err) == 1
+    assert "split.folder.x=1" in err[0]
+
+
+def test_an_option_that_has_moved_is_named_with_its_new_name(command, tmp_path):
+    options = ("agent=ours_noexp", f"outputs={tmp_path}", "mapper.network.epochs=1")
+    code, _, err = command("eval", *options)
+    assert code == 2
+    assert err == ["avn.eval: mapper.network.epochs: is now occupancy_model.epochs; give that"]
 
 
 def test_an_unknown_material_is_refused_before_anything_is_traced(command, tmp_path):

@@ -14,6 +14,7 @@ from avn.datamodules.views import ViewData
 from avn.modules.occupancy_cnn import OccupancyCnn, OccupancyConfig
 from avn.modules.training import BEST, LAST, fit, load_weights
 from avn.modules.view_augment import AugmentConfig
+from avn.reporting.window_figures import WindowFigures
 
 
 def recipe(**changes: Any) -> OccupancyConfig:
@@ -36,7 +37,7 @@ def build(**changes: Any) -> tuple[ViewData, OccupancyCnn]:
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, OccupancyCnn, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("run")
     data, model = build()
-    return folder, model, fit(data, model, folder)
+    return folder, model, fit(data, model, folder, [WindowFigures()])
 
 
 def test_what_is_painted_where_a_cell_is_is_learned(
@@ -134,8 +135,9 @@ def test_every_recipe_key_reaches_the_model() -> None:
 
 
 def test_released_sizes() -> None:
-    conf = Path(__file__).parents[2] / "conf" / "mapper" / "occupancy_released.yaml"
-    node = OmegaConf.load(conf)["network"]
+    conf = Path(__file__).parents[2] / "conf" / "occupancy_model" / "released.yaml"
+    node = OmegaConf.load(conf)
+    del node["defaults"]
     node.train_seed = 0
     model = instantiate(OmegaConf.merge(OmegaConf.structured(recipe()), node))
     convolutions = [layer for layer in model.net.modules() if isinstance(layer, torch.nn.Conv2d)]
@@ -158,9 +160,9 @@ def test_released_sizes() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"looks": 0}, r"mapper\.network\.looks is 0"),
-        ({"depth_weight": -1.0}, r"mapper\.network\.depth_weight is -1"),
-        ({"schedule": "linear"}, r"mapper\.network\.schedule is 'linear'"),
+        ({"looks": 0}, r"occupancy_model\.looks is 0"),
+        ({"depth_weight": -1.0}, r"occupancy_model\.depth_weight is -1"),
+        ({"schedule": "linear"}, r"occupancy_model\.schedule is 'linear'"),
     ],
 )
 def test_bad_option_is_named(changes: dict[str, Any], message: str) -> None:

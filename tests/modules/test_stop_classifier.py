@@ -14,6 +14,7 @@ from avn.datamodules.stop import StopData
 from avn.modules.stop_classifier import StopClassifier, StopModelConfig
 from avn.modules.training import BEST, fit, load_weights
 from avn.pipeline.audio_inference import hear
+from avn.reporting.stop_figures import StopFigures
 
 CONF = Path(__file__).parents[2] / "conf" / "stop_model"
 
@@ -46,7 +47,7 @@ def build(**changes: Any) -> tuple[StopData, StopClassifier]:
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, StopClassifier, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("run")
     data, model = build()
-    return folder, model, fit(data, model, folder)
+    return folder, model, fit(data, model, folder, [StopFigures()])
 
 
 def test_level_tells_how_near_the_source_is(

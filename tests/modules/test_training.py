@@ -14,6 +14,7 @@ from avn.core.errors import UserError
 from avn.datamodules.sound import SoundData
 from avn.modules.sound_cnn import SoundCnn, SoundModelConfig
 from avn.modules.training import BEST, LAST, fit, load_weights
+from avn.reporting.sound_figures import SoundFigures
 
 
 def recipe(**changes: Any) -> SoundModelConfig:
@@ -36,7 +37,7 @@ def build(**changes: Any) -> tuple[SoundData, SoundCnn]:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("run")
-    return folder, fit(*build(), folder)
+    return folder, fit(*build(), folder, [SoundFigures()])
 
 
 def weights(path: Path) -> dict[str, torch.Tensor]:

@@ -55,7 +55,7 @@ def test_a_raised_version_makes_anew_what_depends_on_it(composed, monkeypatch, n
 def test_a_mapper_without_a_network_sees_nothing(composed):
     cfg = composed("mapper=none")
     assert not occupancy.sees_windows(cfg)
-    with pytest.raises(UserError, match="mapper: 'none' sees no free cells; choose occupancy"):
+    with pytest.raises(UserError, match="occupancy_model: 'none' sees no free cells"):
         occupancy.occupancy_model(cfg)
 
 

@@ -9,6 +9,7 @@ from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 from small import A3C, EYES, SMALL
 
+from avn.config import saved
 from avn.config.folder import conf_folder
 from avn.config.saved import read_config
 from avn.config.schema import register
@@ -57,7 +58,7 @@ def test_a_config_that_was_written_and_read_makes_the_same(row):
     register()
     with initialize_config_dir(str(conf_folder()), version_base="1.3"):
         cfg = compose("eval", [f"agent={row}", "split=mini", "sound=clock", "planner.detour=3"])
-    again = replay._typed(OmegaConf.create(OmegaConf.to_yaml(cfg, resolve=True)))
+    again = saved._typed(OmegaConf.create(OmegaConf.to_yaml(cfg, resolve=True)))
     assert OmegaConf.to_container(again) == OmegaConf.to_container(cfg, resolve=True)
     assert run_hash(again) == run_hash(cfg)
 

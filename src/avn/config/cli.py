@@ -28,6 +28,8 @@ from avn.config import audio_source, schema, sweeps
 from avn.config.folder import conf_folder
 from avn.core.errors import UserError
 
+# Nodes of the config that have moved, and where to.
+MOVED = {"mapper.network": "occupancy_model"}
 LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments")
 USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
 
@@ -120,12 +122,16 @@ def arrange(arguments: Iterable[str]) -> list[str]:
     Raises
     ------
     UserError
-        Where a group is given no option.
+        Where a group is given no option, or an option goes by a name that it had.
     """
     sweep, rest = [], []
     groups = _groups()
     for argument in arguments:
         key, equals, value = argument.partition("=")
+        for old, new in MOVED.items():
+            if key.lstrip("+~").startswith(f"{old}."):
+                now = key.lstrip("+~").replace(old, new, 1)
+                raise UserError(f"{key}: is now {now}; give that")
         if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
             raise UserError(f"{argument}: name an option, such as 'none'; there are {groups[key]}")
         if argument in ("-m", "--multirun"):
@@ -179,9 +185,6 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
             return _one_line(str(link))
         if isinstance(link, OverrideParseException):
             return f"{link.override}: cannot be read; put quotes round what Hydra reads as grammar"
-        if isinstance(link, AssertionError) and (key := _overridden(link)):
-            part = key.rpartition(".")[0]
-            return f"{key}: '{part}' is null in this config; leave it out"
     for link in chain:
         if isinstance(link, OSError) and link.filename and not isinstance(link, HydraException):
             return _one_line(f"{link.filename}: {link.strerror}")
@@ -189,14 +192,6 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
         first, *causes = dict.fromkeys(_one_line(str(link)) for link in chain if str(link))
         return "; ".join([first, *(cause for cause in causes[:1] if cause not in first)])
     return None
-
-
-def _overridden(error: BaseException) -> str:
-    """The key that Hydra was about to set; what OmegaConf asserts does not name it."""
-    for frame, _ in traceback.walk_tb(error.__traceback__):
-        if frame.f_code.co_name == "_apply_overrides_to_config":
-            return str(frame.f_locals.get("key") or "")
-    return ""
 
 
 def _one_line(text: str) -> str:
