@@ -88,6 +88,7 @@ def heard_clips(cfg: DictConfig) -> tuple[Any, ...]:
 
 
 def listening_time(cfg: DictConfig, chosen: Sequence[Scene]) -> float:
+    """Seconds that listening to every clip of some scenes takes on two cores, roughly."""
     clips = sum(4 * s.grid.cells * len(s.sources) for s in chosen) * len(cfg.sound) * cfg.takes
     return clips / CLIPS_PER_SECOND
 
@@ -95,10 +96,26 @@ def listening_time(cfg: DictConfig, chosen: Sequence[Scene]) -> float:
 def listen(
     cfg: DictConfig, chosen: Sequence[Scene], open_model: Callable[[], Listener], outcome: Outcome
 ) -> list[Tensor]:
+    """What a network makes of every clip of some scenes, made where it is missing.
+
+    Parameters
+    ----------
+    cfg : DictConfig
+    chosen : sequence of Scene
+    open_model : callable
+        Gives the trained network; called only where something is missing.
+    outcome : Outcome
+        The stage that keeps what the network says.
+
+    Returns
+    -------
+    list of (K, S, sounds, takes, ...) float32 tensor
+        Of each scene; see `hear`.
+    """
     acoustics = scenes.acoustics_of(cfg)
     model = cache(open_model)
 
-    def listen(scene: Scene) -> Tensor:
+    def hear_scene(scene: Scene) -> Tensor:
         return hear(
             scene,
             acoustics.name,
@@ -110,7 +127,7 @@ def listen(
         )
 
     apartments = [build.first_arrival_hash(scene.plan, acoustics) for scene in chosen]
-    return outcome.of(cfg, chosen, apartments, listen)
+    return outcome.of(cfg, chosen, apartments, hear_scene)
 
 
 def hear(
