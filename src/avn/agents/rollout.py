@@ -27,7 +27,7 @@ from avn.navigation.simulator import Simulator
 _MAKERS = {
     "sound": "choose a sound model, such as sound_model=cnn5",
     "reach": "choose what tells when to stop, such as stop_model=cnn5",
-    "window": "choose what sees free squares, such as mapper=occupancy",
+    "window": "choose what sees free squares, such as occupancy_model=small",
     "feature": "choose what knows places again, such as mapper=spatial_memory",
     "sound_feature": "choose a sound model, such as sound_model=cnn5",
 }
