@@ -45,8 +45,8 @@ class SyntheticScene:
     def name(self) -> str:
         return self.plan.name
 
-    def brirs(self, regime: str) -> FreeFieldBrirs:
-        assert regime == "resonance"
+    @property
+    def brirs(self) -> FreeFieldBrirs:
         lattice = torch.from_numpy(self.grid.lattice.astype(np.int64))
         return FreeFieldBrirs(
             relative_locations(lattice, torch.from_numpy(self.sources.astype(np.int64)))

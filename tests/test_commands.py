@@ -10,8 +10,11 @@ import pandas as pd
 import pytest
 import soundfile
 import torch
+from small import composed, fitting
 
 from avn.apartments.splits import FROZEN
+from avn.pipeline.apartments import Apartments
+from avn.pipeline.scenes import DirectSound
 from avn.reporting.results import read_csv
 
 SMALL = (
@@ -21,7 +24,6 @@ SMALL = (
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
     "takes=1",
-    # as in test_planner_commands.py, for views of other settings in one folder are refused
     "renderer.camera.size=32",
     "renderer.samples=1",
     "renderer.light.gather_rays=4",
@@ -31,7 +33,9 @@ SMALL = (
 
 
 def run_greedy(command, outputs, *more):
-    return command("eval", "agent=greedy", *SMALL, f"outputs={outputs}", *more)
+    return command(
+        "eval", "agent=greedy", *fitting("agent=greedy", *SMALL), f"outputs={outputs}", *more
+    )
 
 
 def copy(command, outputs, tmp_path):
@@ -181,15 +185,16 @@ def _other_version(path):
     ("spoil", "said"),
     [(_cut, "cut short"), (_flip, "changed"), (_other_version, "format version 77")],
 )
-@pytest.mark.parametrize("name", ["geometry.h5", "acoustics-tail.h5", "acoustics-resonance.h5"])
+@pytest.mark.parametrize("name", ["geometry", "acoustics-tail", "acoustics-resonance"])
 def test_a_spoilt_scene_file_is_one_line_and_is_left_as_it_is(
     command, outputs, tmp_path, name, spoil, said
 ):
     mine = copy(command, outputs, tmp_path)
     shutil.rmtree(mine / "eval")
     shutil.rmtree(mine / "hear")
-    (tail,) = mine.glob("generate/mini-*/room_1/acoustics-tail.h5")
-    path = tail.with_name(name)
+    room = composed("agent=greedy", *SMALL)
+    sound = DirectSound(room, Apartments(room, "test"))
+    (path,) = (mine / sound.paths[0].relative_to("outputs")).parent.glob(f"{name}-*.h5")
     spoil(path)
     content = path.read_bytes()
     code, _, err = run_greedy(command, mine, "sound=alarm")
@@ -232,7 +237,9 @@ def test_what_is_missing_is_refused_with_auto_false(command, tmp_path):
 
 
 def test_training_prints_its_figures_and_its_folder(command, outputs):
-    code, out, err = command("train", "model=sound_cnn", *SMALL, f"outputs={outputs}")
+    code, out, err = command(
+        "train", "model=sound_cnn", *fitting("model=sound_cnn", *SMALL), f"outputs={outputs}"
+    )
     assert code == 0, err
     metrics = json.loads((Path(out[-1]) / "metrics.json").read_text())
     assert any("error_m/validation/in_sight/all" in line for line in out)
@@ -241,24 +248,39 @@ def test_training_prints_its_figures_and_its_folder(command, outputs):
 
 def test_generate_draws_plans_and_writes_clips(command, outputs):
     code, out, err = command(
-        "generate", *SMALL, f"outputs={outputs}", "export=wav", "clips=[[0,4],[1,9]]"
+        "generate",
+        *fitting("generate", *SMALL),
+        f"outputs={outputs}",
+        "export=wav",
+        "clips=[[0,4],[1,9]]",
     )
     assert code == 0, err
-    room = Path(out[-1]) / "room_1"
+    (line,) = [text for text in out if "/room_1-" in text and " cells, " in text]
+    room = Path(line.split(": ")[0])
     assert (room / "floor_plan.png").read_bytes()[:4] == b"\x89PNG"
     waves = sorted((room / "wav").glob("*.wav"))
     assert len(waves) == 2 * 3
     samples, rate = soundfile.read(waves[0])
     assert rate == 16000
     assert samples.shape == (16000, 2)
-    code, _, err = command("generate", *SMALL, f"outputs={outputs}", "export=wav", "clips=[[9,4]]")
+    code, _, err = command(
+        "generate",
+        *fitting("generate", *SMALL),
+        f"outputs={outputs}",
+        "export=wav",
+        "clips=[[9,4]]",
+    )
     assert code == 2
     assert "clips" in err[-1]
 
 
 def test_reproduce_runs_the_rows_that_are_named(command, outputs):
     code, out, err = command(
-        "reproduce", *SMALL, f"outputs={outputs}", "rows=random_walk,oracle", "seeds=0"
+        "reproduce",
+        *fitting("agent=oracle", *SMALL),
+        f"outputs={outputs}",
+        "rows=random_walk,oracle",
+        "seeds=0",
     )
     assert code == 0, err
     results = pd.read_csv(Path(out[-1]) / "results.csv")

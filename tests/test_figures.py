@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from PIL import Image
-from small import EYES, SMALL
+from small import EYES, SMALL, fitting
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.backend.event_processing.event_multiplexer import EventMultiplexer
 from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData
@@ -14,7 +14,8 @@ from avn import figures
 
 def made(command, outputs, agent):
     eyes = EYES if agent == "ours_noexp" else ()
-    code, out, err = command("eval", f"agent={agent}", *SMALL, *eyes, f"outputs={outputs}")
+    settings = fitting(f"agent={agent}", *SMALL, *eyes)
+    code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}")
     assert code == 0, err
     return out[-1]
 

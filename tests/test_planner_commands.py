@@ -5,6 +5,7 @@ from pathlib import Path
 import h5py
 import pandas as pd
 import pytest
+from small import fitting
 
 SMALL = (
     "split=mini",
@@ -32,8 +33,9 @@ EYES = (
 
 
 def ours(command, outputs, *more):
-    eyes = () if "agent=ours_exp" in more else EYES
-    return command("eval", *SMALL, *eyes, f"outputs={outputs}", *more)
+    agent, *others = more
+    settings = fitting((agent, *others), *SMALL, *EYES)
+    return command("eval", agent, *settings, f"outputs={outputs}", *others)
 
 
 def records(out):
@@ -125,23 +127,23 @@ def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
     ],
 )
 def test_a_mistake_is_one_line(command, outputs, options, said):
-    more = tuple(option for option in SMALL if not option.startswith("sound="))
-    eyes = EYES if "agent=ours_noexp" in options and "mapper=none" not in options else ()
-    code, _, err = command("eval", *more, *eyes, "sound=alarm", f"outputs={outputs}", *options)
+    settings = fitting(options[0], *SMALL, *EYES)
+    code, _, err = command("eval", *settings, f"outputs={outputs}", *options)
     assert code == 2
     assert said in err[-1]
     assert "Traceback" not in "".join(err)
 
 
 def test_views_that_are_missing_are_refused_with_auto_false(command, tmp_path):
-    code, _, err = command("eval", *SMALL, "agent=ours_exp", f"outputs={tmp_path}", "auto=false")
+    settings = fitting("agent=ours_exp", *SMALL)
+    code, _, err = command("eval", *settings, "agent=ours_exp", f"outputs={tmp_path}", "auto=false")
     assert code == 2
     assert "is missing and auto=false" in err[-1]
 
 
 def test_damaged_features_are_one_line(command, outputs):
     ours(command, outputs, "agent=ours_exp")
-    path = next(outputs.glob("generate/mini-*/room_1/features-*.h5"))
+    path = next(outputs.glob("generate/room_1-*/features-*.h5"))
     whole = path.read_bytes()
     try:
         with h5py.File(path, "r+") as file:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from browser import PHONE, chromium, opened, overflows, until
-from small import EYES, SMALL
+from small import EYES, SMALL, fitting
 
 from avn import report
 from avn.reporting import page_media
@@ -22,7 +22,8 @@ def browser():
 
 def made(command, outputs, agent, *more):
     eyes = EYES if agent == "ours_noexp" else ()
-    code, out, err = command("eval", f"agent={agent}", *SMALL, *eyes, f"outputs={outputs}", *more)
+    settings = fitting(f"agent={agent}", *SMALL, *eyes)
+    code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}", *more)
     assert code == 0, err
     return Path(out[-1])
 

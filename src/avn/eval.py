@@ -8,16 +8,22 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from avn.config.cli import command
+from avn.config.unread import refuse_unread
 from avn.core.progress import tell
 from avn.pipeline import films
-from avn.pipeline.run import evaluate, show_run
+from avn.pipeline.run import Evaluation, show_run
+from avn.pipeline.stage import build
 
 
 @command("eval")
 def main(cfg: DictConfig) -> Path:
     """Evaluate one row, or open its finished run, and print the table."""
     films.check(cfg)
-    folder = evaluate(cfg)
+    run = Evaluation(cfg)
+    run.check()
+    refuse_unread("eval", cfg, run.read())
+    build(run, asked=True)
+    folder = run.folder
     show_run(cfg, folder)
     films.make_films(cfg, folder)
     tell(str(folder))

@@ -8,13 +8,15 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from avn.config.cli import command
+from avn.config.unread import refuse_unread
 from avn.core.progress import tell
-from avn.pipeline.export import generate
+from avn.pipeline.export import generate, settings_of
 
 
 @command("generate")
 def main(cfg: DictConfig) -> Path:
     """Make all scenes of the split and export what is asked for."""
+    refuse_unread("generate", cfg, settings_of(cfg))
     folder = generate(cfg)
     tell(str(folder))
     return folder

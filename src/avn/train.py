@@ -8,18 +8,21 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from avn.config.cli import command
+from avn.config.unread import refuse_unread
 from avn.core.progress import tell
-from avn.pipeline.models import train_model
+from avn.pipeline.models import model_of, train_model
 
 
 @command("train")
 def main(cfg: DictConfig) -> Path:
     """Train the model, or open it where it is trained, and print what was measured."""
-    folder, figures = train_model(cfg)
+    model = model_of(cfg)
+    refuse_unread("train", cfg, {*model.read(), "model.name"})
+    figures = train_model(model)
     for name, value in figures.items():
         tell(f"{name}: {value:.3g}")
-    tell(str(folder))
-    return folder
+    tell(str(model.folder))
+    return model.folder
 
 
 if __name__ == "__main__":

@@ -12,13 +12,13 @@ from avn.modules.sound_cnn import SoundModelConfig
 @pytest.fixture(scope="module")
 def clips() -> ClipSet:
     scenes = [synthetic_scene("a"), synthetic_scene("b", 2.5)]
-    return ClipSet(scenes, "resonance", synthetic_sounds(), MicrophoneConfig(), "train", 1)
+    return ClipSet(scenes, synthetic_sounds(), MicrophoneConfig(), "train", 1)
 
 
 def data(**changes: int) -> SoundData:
     recipe = SoundModelConfig(name="test", batch=16, validation_clips=50, **changes)
     scenes = [synthetic_scene("a")], [synthetic_scene("b", 2.5)]
-    return SoundData(*scenes, "resonance", synthetic_sounds(), MicrophoneConfig(), recipe)
+    return SoundData(*scenes, synthetic_sounds(), MicrophoneConfig(), recipe)
 
 
 def test_relative_location_of_the_documented_example() -> None:
@@ -56,7 +56,7 @@ def test_a_clip_does_not_depend_on_its_batch(clips: ClipSet) -> None:
 def test_a_clip_is_its_response_heard() -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
     quiet = MicrophoneConfig(noise_rms=0.0)
-    clips = ClipSet([scene], "resonance", sounds, quiet, "train", 1)
+    clips = ClipSet([scene], sounds, quiet, "train", 1)
     # Facing the source from far and from near: level falls as the formula says.
     batch = clips.__getitems__(clips.item(torch.arange(clips.pairs), torch.tensor(0), 0).tolist())
     level = batch["clips"].square().mean(-1).sqrt()
@@ -75,7 +75,7 @@ def test_training_takes_are_fresh_and_apart_from_evaluation(clips: ClipSet) -> N
     takes = [clips.__getitems__(clips.item(pair, sound, t).tolist())["clips"] for t in (0, 1)]
     assert not torch.allclose(*takes, atol=1e-3)
     scenes = [synthetic_scene("a"), synthetic_scene("b", 2.5)]
-    others = ClipSet(scenes, "resonance", clips.sounds, MicrophoneConfig(), "eval", 1)
+    others = ClipSet(scenes, clips.sounds, MicrophoneConfig(), "eval", 1)
     other = others.__getitems__(others.item(pair, sound, 0).tolist())["clips"]
     assert not torch.allclose(takes[0], other, atol=1e-3)
 
@@ -120,7 +120,7 @@ def test_validation_clips_are_the_same_for_every_train_seed() -> None:
 def test_empty_split_is_named() -> None:
     for split, scenes in (("train", ([], [1])), ("validation", ([1], []))):
         with pytest.raises(UserError, match=f"split.{split} has no apartment"):
-            SoundData(*scenes, "resonance", synthetic_sounds(), MicrophoneConfig(), None)
+            SoundData(*scenes, synthetic_sounds(), MicrophoneConfig(), None)
 
 
 @pytest.mark.parametrize("key", ["sounds_per_pair", "validation_clips"])
@@ -129,7 +129,6 @@ def test_number_that_cannot_work_is_named(key: str) -> None:
         SoundData(
             [synthetic_scene()],
             [synthetic_scene()],
-            "resonance",
             synthetic_sounds(),
             MicrophoneConfig(),
             SoundModelConfig(name="test", **{key: 0}),

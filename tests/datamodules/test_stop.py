@@ -17,7 +17,7 @@ def goal(scene) -> np.ndarray:
 def data(goal=goal, **changes) -> StopData:
     recipe = StopModelConfig(name="test", **{"batch": 16, "validation_clips": 50, **changes})
     scenes = [synthetic_scene("a", 4.0)], [synthetic_scene("b", 4.5)]
-    return StopData(*scenes, "resonance", synthetic_sounds(), MicrophoneConfig(), recipe, goal)
+    return StopData(*scenes, synthetic_sounds(), MicrophoneConfig(), recipe, goal)
 
 
 def test_moves_are_those_of_the_shortest_walk_to_the_goal() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from small import opened
 
 from avn.acoustics import brir
 from avn.acoustics.brir import AcousticsConfig
@@ -10,7 +11,8 @@ from avn.apartments.generator import generate
 from avn.apartments.surfaces import build_surfaces
 from avn.apartments.walls import walls
 from avn.core.errors import UserError
-from avn.dataset import build, scene
+from avn.dataset import build
+from avn.dataset.scene import Brirs
 
 FEW = AcousticsConfig(rays=200, seconds=0.1)
 ROUND = AcousticsConfig(name="diffraction", first_arrival="round_corners", rays=200, seconds=0.1)
@@ -21,13 +23,23 @@ def plan():
     return generate(3, "flat", sources=3, size="small")
 
 
+def sounded(plan, folder, processes=1):
+    """The apartment in both regimes, made in a folder."""
+    scene = opened(plan, FEW, folder)
+    tail = scene.folder / "tail.h5"
+    build.build_reverberation([(scene, tail, "t")], FEW, processes)
+    regimes = []
+    for name, acoustics in (("resonance", FEW), ("diffraction", ROUND)):
+        first = scene.folder / f"{name}.h5"
+        build.build_direct_sound(scene, acoustics, first, name)
+        brirs = Brirs((tail, "t"), (first, name), len(scene.sources), scene.grid.cells)
+        regimes.append(scene.with_brirs(brirs))
+    return regimes
+
+
 @pytest.fixture(scope="module")
 def made(plan, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("made") / plan.name
-    opened = build.build_geometry(plan, FEW, folder)
-    build.build_acoustics([opened], FEW, processes=1)
-    build.build_acoustics([opened], ROUND, processes=1)
-    return opened
+    return sounded(plan, tmp_path_factory.mktemp("made"))
 
 
 def content(folder):
@@ -35,14 +47,13 @@ def content(folder):
 
 
 def test_one_or_two_processes_give_the_same_bytes(plan, made, tmp_path):
-    again = build.build_geometry(plan, FEW, tmp_path / plan.name)
-    build.build_acoustics([again], FEW, processes=2)
-    build.build_acoustics([again], ROUND, processes=2)
-    assert content(again.folder) == content(made.folder)
+    again = sounded(plan, tmp_path, processes=2)
+    assert content(again[0].folder) == content(made[0].folder)
 
 
 def test_a_killed_run_goes_on_where_it_was(plan, made, tmp_path, monkeypatch):
-    opened = build.build_geometry(plan, FEW, tmp_path / plan.name)
+    scene = opened(plan, FEW, tmp_path)
+    file = (scene, scene.folder / "tail.h5", "t")
     traced = []
     render = brir.render_source
 
@@ -54,20 +65,19 @@ def test_a_killed_run_goes_on_where_it_was(plan, made, tmp_path, monkeypatch):
 
     monkeypatch.setattr(brir, "render_source", killed_at_the_second)
     with pytest.raises(KeyboardInterrupt):
-        build.build_acoustics([opened], FEW, processes=1)
-    assert not scene.tail_file(opened.folder).exists()
-    build.build_acoustics([opened], FEW, processes=1)
+        build.build_reverberation([file], FEW, processes=1)
+    assert not file[1].exists()
+    build.build_reverberation([file], FEW, processes=1)
     assert len(traced) == 2 + 2  # one was there, one was killed, two were left
-    name = "acoustics-tail.h5"
-    assert content(opened.folder)[name] == content(made.folder)[name]
-    assert not [path for path in opened.folder.iterdir() if path.name.startswith(".")]
+    assert content(scene.folder)["tail.h5"] == content(made[0].folder)["tail.h5"]
+    assert not [path for path in scene.folder.iterdir() if path.name.startswith(".")]
 
 
 def test_what_is_gathered_is_what_was_rendered(plan, made):
-    brirs = made.brirs("diffraction")
-    grid, config = made.grid, ROUND
+    scene = made[1]
+    brirs, grid, config = scene.brirs, scene.grid, ROUND
     ears = np.column_stack([grid.centres, np.full(grid.cells, config.ear_height)])
-    source = np.array([*grid.centres[made.sources[1]], config.source_height])
+    source = np.array([*grid.centres[scene.sources[1]], config.source_height])
     tail = brir.render_source(build_surfaces(plan), source, ears, config)
     first = brir.render_first_arrivals(walls(plan), source, ears, config)
     whole = brir.combine(tail, first)
@@ -78,23 +88,25 @@ def test_what_is_gathered_is_what_was_rendered(plan, made):
 
 
 def test_the_regimes_share_the_tail_and_differ_in_the_first_arrival(made):
-    files = content(made.folder)
-    assert set(files) == {
-        "geometry.h5",
-        "acoustics-tail.h5",
-        "acoustics-resonance.h5",
-        "acoustics-diffraction.h5",
-    }
-    assert files["acoustics-resonance.h5"] != files["acoustics-diffraction.h5"]
+    one, other = (scene.brirs for scene in made)
+    hidden = np.argwhere(~made[0].in_sight)[0]
+    seen = np.argwhere(made[0].in_sight)[0]
+    for (source, cell), equal in ((seen, True), (hidden, False)):
+        pair = torch.tensor([source]), torch.tensor([4 * cell])
+        assert torch.equal(one.gather(*pair), other.gather(*pair)) == equal
 
 
-def test_files_of_another_floor_plan_are_refused(made):
-    other = generate(4, "flat", sources=3, size="small")
-    with pytest.raises(UserError, match="another floor plan"):
-        build.build_geometry(other, FEW, made.folder)
+def test_responses_of_another_making_are_refused(made):
+    tail, first = (made[0].folder / name for name in ("tail.h5", "resonance.h5"))
+    pairs = len(made[0].sources), made[0].grid.cells
+    with pytest.raises(UserError, match="another floor plan or other settings"):
+        Brirs((tail, "another"), (first, "resonance"), *pairs)
+    with pytest.raises(UserError, match=r"resonance\.h5: made from another"):
+        Brirs((tail, "t"), (first, "diffraction"), *pairs)
 
 
 def test_geometry_is_what_the_plan_says(plan, made):
-    assert made.plan == plan
-    assert made.in_sight[np.arange(3), made.sources].all()
-    assert (np.diag(made.grid.distances) == 0).all()
+    scene = made[0]
+    assert scene.plan == plan
+    assert scene.in_sight[np.arange(3), scene.sources].all()
+    assert (np.diag(scene.grid.distances) == 0).all()

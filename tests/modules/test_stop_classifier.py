@@ -34,7 +34,6 @@ def build(**changes: Any) -> tuple[StopData, StopClassifier]:
     scenes = [synthetic_scene("a", 4.0)], [synthetic_scene("b", 4.5)]
     data = StopData(
         *scenes,
-        "resonance",
         synthetic_sounds(),
         MicrophoneConfig(),
         config,
@@ -103,7 +102,7 @@ def test_every_state_gets_a_probability(
     run: tuple[Path, StopClassifier, dict[str, Any]],
 ) -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    given = (scene, "resonance", sounds, run[1], 2, MicrophoneConfig(), 5, False)
+    given = (scene, sounds, run[1], 2, MicrophoneConfig(), 5, False)
     scores = hear(*given)
     assert scores.shape == (2, 4 * scene.grid.cells, 2, 2)
     assert scores.dtype == torch.float32

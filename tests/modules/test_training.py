@@ -30,7 +30,7 @@ def recipe(**changes: Any) -> SoundModelConfig:
 def build(**changes: Any) -> tuple[SoundData, SoundCnn]:
     config = recipe(**changes)
     scenes = [synthetic_scene("a")], [synthetic_scene("b", 2.5)]
-    data = SoundData(*scenes, "resonance", synthetic_sounds(), MicrophoneConfig(), config)
+    data = SoundData(*scenes, synthetic_sounds(), MicrophoneConfig(), config)
     return data, instantiate(OmegaConf.structured(config))
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pandas as pd
 import pytest
+from small import opened
 
 from avn.acoustics.brir import AcousticsConfig
 from avn.agents.oracle import Oracle
 from avn.agents.random_walk import RandomWalk
 from avn.agents.rollout import Labels, walk_room
 from avn.apartments.splits import SplitConfig, load_split
-from avn.dataset.build import build_geometry
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
 from avn.navigation.protocols import Protocol
 from avn.reporting.results import headline, summarise
@@ -25,7 +25,7 @@ PROTOCOLS = {
 def rooms(tmp_path_factory):
     folder = tmp_path_factory.mktemp("var")
     plans = load_split(SplitConfig(folder="var"))["test"]
-    return [build_geometry(plan, AcousticsConfig(), folder / plan.name) for plan in plans]
+    return [opened(plan, AcousticsConfig(), folder) for plan in plans]
 
 
 def walked(agent, rooms, protocol, episodes):

@@ -22,7 +22,7 @@ def model() -> SoundCnn:
 @pytest.fixture(scope="module")
 def heard(model: SoundCnn) -> torch.Tensor:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    return hear(scene, "resonance", sounds, model, 2, MicrophoneConfig(), seed=5, progress=False)
+    return hear(scene, sounds, model, 2, MicrophoneConfig(), seed=5, progress=False)
 
 
 def test_every_clip_is_heard(model: SoundCnn, heard: torch.Tensor) -> None:
@@ -30,7 +30,7 @@ def test_every_clip_is_heard(model: SoundCnn, heard: torch.Tensor) -> None:
     assert heard.shape == (2, 4 * scene.grid.cells, 2, 2, 2)
     assert heard.dtype == torch.float32
     # The clips are those that the data module renders for the same take.
-    clips = ClipSet([scene], "resonance", sounds, MicrophoneConfig(), "eval", 5)
+    clips = ClipSet([scene], sounds, MicrophoneConfig(), "eval", 5)
     pairs = torch.tensor([0, 7, clips.pairs - 1])
     for sound in range(2):
         for take in range(2):
@@ -45,7 +45,7 @@ def test_takes_and_seeds_differ_and_repeat(model: SoundCnn, heard: torch.Tensor)
     scene, sounds = synthetic_scene(), synthetic_sounds()
 
     def again(takes: int, seed: int) -> torch.Tensor:
-        given = (scene, "resonance", sounds, model, takes, MicrophoneConfig(), seed, False)
+        given = (scene, sounds, model, takes, MicrophoneConfig(), seed, False)
         return hear(*given)
 
     assert torch.equal(again(2, 5), heard)
@@ -57,7 +57,7 @@ def test_takes_and_seeds_differ_and_repeat(model: SoundCnn, heard: torch.Tensor)
 def test_errors_are_medians_over_the_right_clips(heard: torch.Tensor) -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
     table = sound_errors(scene, heard, sounds.names).set_index(["sound", "sight"])
-    truth = scene.brirs("resonance").locations.numpy()[:, :, None, None]
+    truth = scene.brirs.locations.numpy()[:, :, None, None]
     error = np.linalg.norm(heard.numpy() - truth, axis=-1)
     seen = np.repeat(scene.in_sight, 4, axis=1)
     row = table.loc[("hum", "out_of_sight")]
@@ -68,7 +68,7 @@ def test_errors_are_medians_over_the_right_clips(heard: torch.Tensor) -> None:
 
 def test_front_back_confusions_are_counted() -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    truth = scene.brirs("resonance").locations[:, :, None, None].repeat(1, 1, 2, 1, 1)
+    truth = scene.brirs.locations[:, :, None, None].repeat(1, 1, 2, 1, 1)
     confused = truth.clone()
     confused[:, :, 1] *= -1.0
     table = sound_errors(scene, confused, sounds.names).set_index(["sound", "sight"])

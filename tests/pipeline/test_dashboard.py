@@ -1,5 +1,4 @@
 import io
-from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -7,9 +6,8 @@ from rich.console import Console
 from avn.core.progress import progress_bar
 from avn.pipeline import dashboard
 from avn.pipeline.dashboard import Dashboard
-from avn.pipeline.stage import Stage
 
-STAGES = [Stage(f"stage {n}", Path("nowhere"), 100.0, True) for n in range(20)]
+STAGES = [(f"stage {n}", 100.0) for n in range(20)]
 
 
 @pytest.fixture
@@ -71,7 +69,7 @@ def test_stages_and_rows_fill_as_they_are_made(clock):
 
 @pytest.mark.parametrize("height", [24, 40])
 def test_it_fits_the_terminal(height):
-    stages = [Stage("what is made " * 20, Path("nowhere"), 100.0, True) for _ in range(40)]
+    stages = [("what is made " * 20, 100.0)] * 40
     console = Console(file=io.StringIO(), force_terminal=True, width=80, height=height)
     shown = Dashboard(stages, [f"row_{n}" for n in range(10)], {}, console)
     for _ in range(20):

@@ -5,11 +5,13 @@ from pathlib import Path
 import imageio_ffmpeg
 import pandas as pd
 import pytest
-from small import SMALL
+from small import SMALL, fitting
 
 
 def run(command, outputs, *more):
-    return command("eval", "agent=greedy", *SMALL, f"outputs={outputs}", *more)
+    return command(
+        "eval", "agent=greedy", *fitting("agent=greedy", *SMALL), f"outputs={outputs}", *more
+    )
 
 
 def test_films_of_what_is_asked_for_lie_in_the_run_and_change_nothing(command, outputs):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from small import fitting
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from avn.pipeline.trained import METRICS
@@ -48,9 +49,14 @@ RECIPE = (
 )
 
 
-def arguments(row, outputs, *more):
+def walking(row, outputs, *more):
+    return ("eval", f"agent={row}", *arguments(row, outputs, *more, kind="agent"))
+
+
+def arguments(row, outputs, *more, kind="model"):
     eyes = EYES if "mapper" in row else ()
-    return (*WORLD, *eyes, *RECIPE, f"outputs={outputs}", *more)
+    settings = fitting(f"{kind}={row}", *WORLD, *eyes, *RECIPE)
+    return (*settings, f"outputs={outputs}", *more)
 
 
 @pytest.mark.parametrize("row", ROWS)
@@ -67,14 +73,18 @@ def test_a_row_is_trained_measured_and_walks(command, outputs, row):
     wanted = {f"{part}/{name}" for part in ("training", "validation") for name in wanted}
     rates = {"train/return", "train/entropy", "loss/value", "train/gradient_norm"}
     assert wanted | rates | {"train/steps_per_second"} <= set(events)
-    code, out, err = command("eval", f"agent={row}", *arguments(row, outputs, "sound=alarm"))
+    code, out, err = command(
+        "eval", f"agent={row}", *arguments(row, outputs, "sound=alarm", kind="agent")
+    )
     assert code == 0, err
     episodes = pd.read_csv(Path(out[-1]) / "episodes.csv")
     assert set(episodes["agent"]) == {row}
     first = (Path(out[-1]) / "episodes.csv").read_bytes()
     for name in ("episodes.csv", "results.csv"):
         (Path(out[-1]) / name).unlink()
-    _, out, _ = command("eval", f"agent={row}", *arguments(row, outputs, "sound=alarm"))
+    _, out, _ = command(
+        "eval", f"agent={row}", *arguments(row, outputs, "sound=alarm", kind="agent")
+    )
     assert (Path(out[-1]) / "episodes.csv").read_bytes() == first
 
 
@@ -82,7 +92,9 @@ def test_the_likeliest_actions_are_another_run_of_the_same_network(command, outp
     folders = []
     for samples in ("true", "false"):
         more = (f"baseline.samples={samples}", "sound=alarm")
-        code, out, err = command("eval", "agent=a3c_v", *arguments("a3c_v", outputs, *more))
+        code, out, err = command(
+            "eval", "agent=a3c_v", *arguments("a3c_v", outputs, *more, kind="agent")
+        )
         assert code == 0, err
         folders.append(out[-1])
     assert len(set(folders)) == 2
@@ -96,7 +108,7 @@ def test_a_training_that_ended_is_reused_and_one_that_is_missing_is_refused(comm
     _, out, _ = command("train", "model=a3c_v", *arguments("a3c_v", outputs))
     assert (Path(out[-1]) / BEST).read_bytes() == before
     more = ("auto=false", "a3c.gamma=0.9", "sound=alarm")
-    code, _, err = command("eval", "agent=a3c_v", *arguments("a3c_v", outputs, *more))
+    code, _, err = command(*walking("a3c_v", outputs, *more))
     assert code == 2
     assert len(err) == 1
     assert "missing and auto=false" in err[0]
@@ -115,7 +127,7 @@ def test_a_training_that_ended_is_reused_and_one_that_is_missing_is_refused(comm
 def test_what_cannot_work_is_one_line(command, outputs, option, line):
     row = "a3c_va_mapper" if "map_width" in option else "a3c_v"
     name, kind = ("eval", "agent") if "truth" in option else ("train", "model")
-    code, _, err = command(name, f"{kind}={row}", *arguments(row, outputs, option))
+    code, _, err = command(name, f"{kind}={row}", *arguments(row, outputs, option, kind=kind))
     assert code == 2
     assert len(err) == 1, err
     assert line in err[0]
@@ -133,7 +145,9 @@ def test_a_damaged_checkpoint_is_refused(command, outputs):
     best = Path(out[-1]) / BEST
     whole = best.read_bytes()
     best.write_bytes(whole[: len(whole) // 2])
-    code, _, err = command("eval", "agent=a3c_v", *arguments("a3c_v", outputs, "sound=ring"))
+    code, _, err = command(
+        "eval", "agent=a3c_v", *arguments("a3c_v", outputs, "sound=ring", kind="agent")
+    )
     best.write_bytes(whole)
     assert code == 2
     assert "best.ckpt: damaged" in err[-1]

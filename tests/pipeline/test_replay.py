@@ -7,16 +7,17 @@ import pytest
 import torch
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
-from small import A3C, EYES, SMALL
+from small import A3C, EYES, SMALL, fitting
 
 from avn.config import saved
 from avn.config.folder import conf_folder
 from avn.config.saved import read_config
 from avn.config.schema import register
 from avn.core.errors import UserError
-from avn.pipeline import replay, sound_network
+from avn.pipeline import replay
 from avn.pipeline.observed import Perceived
-from avn.pipeline.run import run_folder_name, run_hash
+from avn.pipeline.run import Evaluation
+from avn.pipeline.sound_network import SoundNetwork
 from avn.reporting.results import write_csv
 
 
@@ -27,7 +28,8 @@ def open_run(folder):
 def made(command, outputs, agent, *more):
     eyes = EYES if agent == "ours_noexp" or agent.endswith("mapper") else ()
     eyes += A3C if agent.startswith("a3c") else ()
-    code, out, err = command("eval", f"agent={agent}", *SMALL, *eyes, f"outputs={outputs}", *more)
+    settings = fitting(f"agent={agent}", *SMALL, *eyes)
+    code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}", *more)
     assert code == 0, err
     return Path(out[-1])
 
@@ -39,7 +41,7 @@ def test_a_run_is_walked_again_from_its_own_config(command, outputs, agent):
     folder = made(command, outputs, agent)
     run = open_run(folder)
     # nothing of the config was lost: what it makes has the same name
-    assert run_folder_name(run.cfg) == folder.relative_to(outputs / "eval").as_posix()
+    assert Evaluation(run.cfg).folder == folder
     labels = [0, 3, len(run.episodes) - 1]
     traces = replay.traces(run, labels)
     for label, trace in zip(labels, traces, strict=True):
@@ -60,12 +62,12 @@ def test_a_config_that_was_written_and_read_makes_the_same(row):
         cfg = compose("eval", [f"agent={row}", "split=mini", "sound=clock", "planner.detour=3"])
     again = saved._typed(OmegaConf.create(OmegaConf.to_yaml(cfg, resolve=True)))
     assert OmegaConf.to_container(again) == OmegaConf.to_container(cfg, resolve=True)
-    assert run_hash(again) == run_hash(cfg)
+    assert Evaluation(again).fingerprint == Evaluation(cfg).fingerprint
 
 
 def test_the_clips_of_a_trace_are_those_that_the_network_heard(command, outputs):
     run = open_run(made(command, outputs, "greedy"))
-    model, _ = sound_network.sound_model(run.cfg)
+    model = SoundNetwork(run.cfg).load()
     perceived = Perceived(run)
     for trace in replay.traces(run, [1, len(run.episodes) - 2]):
         with torch.inference_mode():
@@ -95,7 +97,7 @@ def test_records_of_another_making_are_refused(command, outputs):
 
 def test_a_run_of_another_version_sets_off_no_training(command, outputs, monkeypatch):
     folder = made(command, outputs, "greedy")
-    monkeypatch.setitem(sound_network.VERSIONS, "sound_cnn", 99)
+    monkeypatch.setattr(SoundNetwork, "version", 99)
     before = set((outputs / "train").iterdir())
     with pytest.raises(UserError, match=r"of another version of avn .* is missing and auto=false"):
         replay.traces(open_run(folder), [0])

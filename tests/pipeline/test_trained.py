@@ -1,67 +1,88 @@
-"""Networks as stages: what is there is reused, what is missing made, what is damaged named."""
-
-from pathlib import Path
+"""Networks as stages: what is there is reused, and what is damaged is named."""
 
 import pytest
 import torch
-from omegaconf import OmegaConf
-from synthetic_scene import synthetic_scene
+from small import composed
 
 from avn.core.errors import UserError
-from avn.pipeline.per_scene import Outcome
-from avn.pipeline.trained import METRICS, read_metrics
+from avn.pipeline.apartments import Apartments
+from avn.pipeline.per_scene import ApartmentTensors
+from avn.pipeline.sound_network import SoundNetwork
+from avn.pipeline.stage import build, missing
+from avn.pipeline.trained import METRICS
 
 
-def outcome(**changes):
-    given = {"stage": "see", "what": "small", "kind": "windows", "dataset": "probabilities"}
-    given |= {"version": 1, "made_from": "ab" * 32, "title": "what is seen", "seconds": 1.0}
-    return Outcome(**{**given, **changes})
+class Counts(ApartmentTensors):
+    """A tensor with the number of the apartment."""
+
+    kind = "see/counts"
+    made: list[int] = []  # noqa: RUF012
+
+    @property
+    def title(self):
+        return "counts"
+
+    def settings(self):
+        return ("takes",)
+
+    def content_of(self, plan):
+        return plan.to_dict()
+
+    def opened(self):
+        def count(index):
+            self.made.append(index)
+            return torch.full((3, 2), float(index))
+
+        return count
 
 
-def config(folder, auto=True):
-    return OmegaConf.create({"outputs": str(folder), "auto": auto})
+@pytest.fixture
+def counts(tmp_path):
+    Counts.made.clear()
+
+    def stage(*overrides):
+        cfg = composed(f"outputs={tmp_path}", *overrides)
+        return Counts(cfg, Apartments(cfg, "test"))
+
+    return stage
 
 
-def test_each_apartment_is_made_once(tmp_path):
-    scenes = [synthetic_scene("a"), synthetic_scene("b")]
-    made = []
-
-    def make(scene):
-        made.append(scene.name)
-        return torch.full((3, 2), float(len(made)))
-
-    found = outcome().of(config(tmp_path), scenes[:1], ["one"], make)
-    assert made == ["a"]
-    again = outcome().of(config(tmp_path), scenes, ["one", "two"], make)
-    assert made == ["a", "b"]
-    assert torch.equal(found[0], again[0])
-    assert float(again[1][0, 0]) == 2
-    # An apartment that has changed is made anew, and so is all that another network makes.
-    outcome().of(config(tmp_path), scenes[:1], ["changed"], make)
-    outcome(made_from="cd" * 32).of(config(tmp_path), scenes[:1], ["one"], make)
-    assert made == ["a", "b", "a", "a"]
+def test_each_apartment_is_made_once(counts):
+    build(counts())
+    assert counts().made == [0, 1, 2, 3, 4]
+    assert [float(own[0, 0]) for own in counts().load()] == [0.0, 1.0, 2.0, 3.0, 4.0]
+    counts().paths[2].unlink()
+    assert missing([counts()]) != []
+    build(counts())
+    assert Counts.made[5:] == [2]
+    build(counts("takes=2"))
+    assert Counts.made[6:] == [0, 1, 2, 3, 4]
 
 
-def test_what_is_missing_is_refused_with_auto_false(tmp_path):
-    with pytest.raises(UserError, match=r"what is seen in a is missing and auto=false"):
-        outcome().of(config(tmp_path, auto=False), [synthetic_scene("a")], ["one"], torch.ones)
+def test_what_is_kept_along_the_way_is_not_made_again(counts):
+    counts().keep(1, torch.ones(3, 2))
+    build(counts())
+    assert Counts.made == [0, 2, 3, 4]
+    assert torch.equal(counts().load()[1], torch.ones(3, 2))
 
 
-def test_a_damaged_file_is_one_line(tmp_path):
-    def run():
-        return outcome().of(
-            config(tmp_path), [synthetic_scene("a")], ["one"], lambda _: torch.ones(4)
-        )
+def test_what_is_missing_is_refused_with_auto_false(counts):
+    with pytest.raises(UserError, match=r"counts is missing and auto=false"):
+        build(counts("auto=false"))
 
-    run()
-    (path,) = Path(tmp_path).rglob("*.h5")
+
+def test_a_damaged_file_is_one_line(counts):
+    build(counts())
+    path = counts().paths[0]
     path.write_bytes(path.read_bytes()[:-8])
     with pytest.raises(UserError, match="cut short") as caught:
-        run()
+        counts().load()
     assert str(path) in str(caught.value)
 
 
 def test_damaged_metrics_are_one_line(tmp_path):
-    (tmp_path / METRICS).write_text("{")
+    network = SoundNetwork(composed("agent=greedy", "split=mini", f"outputs={tmp_path}"))
+    network.folder.mkdir(parents=True)
+    (network.folder / METRICS).write_text("{")
     with pytest.raises(UserError, match=r"metrics\.json: damaged; delete"):
-        read_metrics(tmp_path)
+        network.metrics()

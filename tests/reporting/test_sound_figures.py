@@ -20,7 +20,7 @@ def test_to_world_undoes_relative_locations() -> None:
 
 def test_locations_are_drawn_where_they_are_heard() -> None:
     scene = synthetic_scene()
-    target = scene.brirs("resonance").locations[0].numpy()
+    target = scene.brirs.locations[0].numpy()
     seen = np.repeat(scene.in_sight[0], 4)
     figure = location_figure(scene.plan, scene.grid.lattice, target, target, seen, "title")
     axes = figure.axes[0]

@@ -42,17 +42,17 @@ class AcousticsConfig:
 REGIME_OF = {"resonance": "through_walls", "diffraction": "round_corners"}
 
 
-def check_config(config: AcousticsConfig) -> AcousticsConfig:
-    """The config itself, or a `UserError` that names the key and says what it may be."""
+def check_config(config: AcousticsConfig, node: str = "acoustics") -> AcousticsConfig:
+    """The config itself, or a `UserError` that names the key below `node` and what it may be."""
     if config.first_arrival not in REGIMES:
         raise UserError(
-            f"acoustics.first_arrival: '{config.first_arrival}' is not known; "
+            f"{node}.first_arrival: '{config.first_arrival}' is not known; "
             f"use {' or '.join(REGIMES)}"
         )
     if REGIME_OF.get(config.name, config.first_arrival) != config.first_arrival:
         raise UserError(
-            f"acoustics.first_arrival: '{config.first_arrival}' is not what the regime "
-            f"'{config.name}' means; give it a name of its own with acoustics.name=mine"
+            f"{node}.first_arrival: '{config.first_arrival}' is not what the regime "
+            f"'{config.name}' means; give it a name of its own with {node}.name=mine"
         )
     limits: dict[str, tuple[float, float]] = {
         "seconds": (0.05, 10.0),
@@ -67,7 +67,7 @@ def check_config(config: AcousticsConfig) -> AcousticsConfig:
     for key, (low, high) in limits.items():
         value = getattr(config, key)
         if not low <= value <= high:
-            raise UserError(f"acoustics.{key}: {value} is out of range; use {low:g} to {high:g}")
+            raise UserError(f"{node}.{key}: {value} is out of range; use {low:g} to {high:g}")
     return config
 
 

@@ -33,6 +33,12 @@ _MAKERS = {
 }
 
 
+def missing_observation(agent: str, name: str) -> UserError:
+    """The error where an agent needs an observation that nothing makes."""
+    maker = _MAKERS.get(name, "choose another agent")
+    return UserError(f"agent {agent} needs the observation '{name}': {maker}")
+
+
 # What looks on at a walk: it is shown simulator and agent, what is observed, and the actions that
 # follow, which are None when all episodes are over; it says whether it has seen enough.
 Watch = Callable[[Simulator, Agent, TensorDict, Tensor | None], bool]
@@ -93,8 +99,7 @@ def walk(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> None
     """
     observation = simulator.reset()
     for key in sorted(set(agent.wants(simulator.protocol)) - set(observation.keys())):
-        maker = _MAKERS.get(key, "choose another agent")
-        raise UserError(f"agent {type(agent).__name__} needs the observation '{key}': {maker}")
+        raise missing_observation(type(agent).__name__, key)
     episodes = simulator.episodes
     generator = torch.Generator().manual_seed(derive("agent", episodes.seed, episodes.room) >> 1)
     agent.reset(len(simulator), generator, simulator.protocol)

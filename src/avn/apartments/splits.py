@@ -57,27 +57,18 @@ def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
     Returns
     -------
     dict of list of FloorPlan
-        Under `train`, `validation` and `test`; each part has at least one apartment. No layout
-        occurs twice, turned or mirrored ones included, among generated apartments.
+        Under `train`, `validation` and `test`; a folder may have apartments of some parts only.
+        No layout occurs twice, turned or mirrored ones included, among generated apartments.
 
     Raises
     ------
     UserError
-        Where a part is empty, a file or folder is missing or broken, or a number is wrong.
+        Where there is no apartment, a file or folder is missing or broken, or a number is wrong.
     """
-    if cfg.folder is not None:
-        split = _frozen(cfg, cfg.folder)
-        for part in PARTS:
-            if not split[part]:
-                raise UserError(
-                    f"split.{part} is empty: no floor plan of that part in {cfg.folder}; "
-                    "add one (train_*.json, val_*.json, any other name for test)"
-                )
-        return split
-    return _generated(cfg)
+    return _generated(cfg) if cfg.folder is None else _frozen(cfg.folder)
 
 
-def _frozen(cfg: SplitConfig, where: str) -> dict[str, list[FloorPlan]]:
+def _frozen(where: str) -> dict[str, list[FloorPlan]]:
     folder = FROZEN / where
     folder = folder if folder.is_dir() else Path(where).expanduser()
     if not folder.is_dir():
@@ -89,6 +80,8 @@ def _frozen(cfg: SplitConfig, where: str) -> dict[str, list[FloorPlan]]:
             raise UserError(f"{path}: the plan is named '{plan.name}'; name it like its file")
         part = {"train": "train", "val": "validation"}.get(path.stem.split("_")[0], "test")
         split[part].append(plan)
+    if not any(split.values()):
+        raise UserError(f"split.folder: no floor plan in {where}; add one, such as room_1.json")
     return split
 
 

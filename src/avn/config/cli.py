@@ -30,6 +30,14 @@ from avn.core.errors import UserError
 
 # Nodes of the config that have moved, and where to.
 MOVED = {"mapper.network": "occupancy_model"}
+# What is chosen for the training world, as Hydra spells it; apartments and acoustics follow the
+# test world until they are chosen.
+TRAINING = {
+    "training.scenes": "+split@training.scenes",
+    "training.acoustics": "+acoustics@training.acoustics",
+    "training.microphone": "microphone@training.microphone",
+    "training.sounds": "sound@training.sounds",
+}
 LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments")
 USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
 
@@ -138,11 +146,27 @@ def arrange(arguments: Iterable[str]) -> list[str]:
             sweep = ["--multirun"]
         elif equals and key in LIST_KEYS and not value.startswith("["):
             rest.append(f"{key}=[{value}]")
-        elif equals and key == "sound":
-            rest.append(f"sound={audio_source.quoted(value)}")
+        elif equals and key in ("sound", "training.sounds"):
+            rest.append(f"{TRAINING.get(key, key)}={audio_source.quoted(value)}")
+        elif equals and key in TRAINING:
+            rest.append(f"{TRAINING[key]}={value}")
         else:
             rest.append(argument)
+    _check_training(rest)
     return sweep + rest
+
+
+def _check_training(arguments: list[str]) -> None:
+    """Refuse a setting of the training world that would change the test world with it."""
+    for name in ("scenes", "acoustics"):
+        key = f"training.{name}"
+        for argument in arguments:
+            follows = not any(own.startswith(f"{TRAINING[key]}=") for own in arguments)
+            if argument.startswith(f"{key}.") and follows:
+                raise UserError(
+                    f"{argument}: the training world follows the test world here; choose its "
+                    f"own first, such as {key}={'var' if name == 'scenes' else 'resonance'}"
+                )
 
 
 def _groups() -> dict[str, str]:

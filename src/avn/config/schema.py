@@ -32,6 +32,8 @@ from avn.views.renderer import RendererConfig
 
 # Every recipe is trained with the one `train_seed`, unless it is given its own.
 _SEED: Any = II("train_seed")
+_TEST_SPLIT: Any = II("split")
+_TEST_ACOUSTICS: Any = II("acoustics")
 
 
 @dataclass
@@ -54,6 +56,19 @@ class AgentConfig:
 
 
 @dataclass
+class TrainingConfig:
+    """The world in which networks are trained: apartments, acoustics, microphone and sounds.
+
+    Apartments and acoustics are those of the test world, unless they are chosen.
+    """
+
+    scenes: SplitConfig = _TEST_SPLIT
+    acoustics: AcousticsConfig = _TEST_ACOUSTICS
+    microphone: MicrophoneConfig = MISSING
+    sounds: dict[str, str] = MISSING
+
+
+@dataclass
 class CoreConfig:
     """What every command has: the groups, and machine settings."""
 
@@ -61,6 +76,7 @@ class CoreConfig:
     acoustics: AcousticsConfig = MISSING
     microphone: MicrophoneConfig = MISSING
     sound: dict[str, str] = MISSING
+    training: TrainingConfig = field(default_factory=TrainingConfig)
     sound_model: SoundModelConfig = MISSING
     stop_model: StopModelConfig = MISSING
     protocol: ProtocolConfig = MISSING

@@ -14,7 +14,7 @@ from torch.utils.data import Dataset, Sampler
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
 from avn.core.errors import UserError
 from avn.core.prefetch import AheadLoader
-from avn.dataset.scene import Brirs, Scene
+from avn.dataset.scene import AudibleScene, Brirs, Scene
 from avn.dataset.source_locations import where_sources_are
 from avn.modules.listener import ClipBatch, PictureBatch
 from avn.modules.network import build_part
@@ -32,7 +32,7 @@ class SceneClips:
     Attributes
     ----------
     brirs : Brirs
-        Impulse responses of the regime.
+        Impulse responses.
     locations : (K, S, 2) float32 tensor
         Metres right and front.
     in_sight : (K, S) bool tensor
@@ -43,9 +43,9 @@ class SceneClips:
     in_sight: Tensor
 
     @classmethod
-    def of(cls, scene: Scene, regime: str) -> SceneClips:
-        """Open an apartment in one regime."""
-        return cls(scene.brirs(regime), *where_sources_are(scene))
+    def of(cls, scene: AudibleScene) -> SceneClips:
+        """Of an apartment."""
+        return cls(scene.brirs, *where_sources_are(scene))
 
 
 class ClipSet(Dataset[ClipBatch]):
@@ -57,9 +57,7 @@ class ClipSet(Dataset[ClipBatch]):
 
     Parameters
     ----------
-    scenes : sequence of Scene
-    regime : str
-        Which impulse responses.
+    scenes : sequence of AudibleScene
     sounds : DrySounds
     microphone : MicrophoneConfig
     purpose : {"train", "eval"}
@@ -71,15 +69,14 @@ class ClipSet(Dataset[ClipBatch]):
 
     def __init__(
         self,
-        scenes: Sequence[Scene],
-        regime: str,
+        scenes: Sequence[AudibleScene],
         sounds: DrySounds,
         microphone: MicrophoneConfig,
         purpose: str,
         seed: int,
         targets: Sequence[Tensor] | None = None,
     ) -> None:
-        self.scenes = [SceneClips.of(scene, regime) for scene in scenes]
+        self.scenes = [SceneClips.of(scene) for scene in scenes]
         self.sounds = sounds
         self.renderer = ClipRenderer(sounds, microphone, seed, purpose)
         shapes = [clips.in_sight.shape for clips in self.scenes]
@@ -206,10 +203,8 @@ class SoundData(L.LightningDataModule):
 
     Parameters
     ----------
-    train, validation : sequence of Scene
+    train, validation : sequence of AudibleScene
         Apartments of the two splits.
-    regime : str
-        `resonance` or `diffraction`.
     sounds : DrySounds
         Training hears all of them.
     microphone : MicrophoneConfig
@@ -232,9 +227,8 @@ class SoundData(L.LightningDataModule):
 
     def __init__(
         self,
-        train: Sequence[Scene],
-        validation: Sequence[Scene],
-        regime: str,
+        train: Sequence[AudibleScene],
+        validation: Sequence[AudibleScene],
         sounds: DrySounds,
         microphone: MicrophoneConfig,
         recipe: SoundModelConfig,
@@ -257,9 +251,9 @@ class SoundData(L.LightningDataModule):
         self.threads = 1
         seed = recipe.train_seed
 
-        def clips(scenes: Sequence[Scene], purpose: str, seed: int) -> ClipSet:
+        def clips(scenes: Sequence[AudibleScene], purpose: str, seed: int) -> ClipSet:
             targets = [self.target_of(scene) for scene in scenes]
-            return ClipSet(scenes, regime, sounds, microphone, purpose, seed, targets)
+            return ClipSet(scenes, sounds, microphone, purpose, seed, targets)
 
         self.train_clips = clips(train, "train", seed)
         self.measured_clips = {

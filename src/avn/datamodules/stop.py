@@ -13,7 +13,7 @@ from torch.utils.data import Sampler
 from avn.acoustics.clips import DrySounds, MicrophoneConfig
 from avn.core.errors import UserError
 from avn.datamodules.sound import ClipSet, SoundData
-from avn.dataset.scene import Scene
+from avn.dataset.scene import AudibleScene, Scene
 from avn.modules.stop_classifier import StopModelConfig
 
 # Tells the cells of an apartment, (K, C) bool, at which each source counts as reached.
@@ -44,7 +44,7 @@ class StopData(SoundData):
 
     Parameters
     ----------
-    train, validation, regime, sounds, microphone
+    train, validation, sounds, microphone
         As `SoundData` takes them.
     recipe : StopModelConfig
         Its `positives` is the share of training clips that are heard at the goal.
@@ -57,16 +57,15 @@ class StopData(SoundData):
 
     def __init__(
         self,
-        train: Sequence[Scene],
-        validation: Sequence[Scene],
-        regime: str,
+        train: Sequence[AudibleScene],
+        validation: Sequence[AudibleScene],
         sounds: DrySounds,
         microphone: MicrophoneConfig,
         recipe: StopModelConfig,
         goal: GoalCells,
     ) -> None:
         self.goal = goal
-        super().__init__(train, validation, regime, sounds, microphone, recipe)
+        super().__init__(train, validation, sounds, microphone, recipe)
         self.positives = recipe.positives
         if not 0 < float(self.train_clips.target.eq(0).float().mean()) < 1:
             raise UserError(

@@ -8,87 +8,84 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from avn.acoustics import brir
 from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.first_arrival import FirstArrivals
 from avn.acoustics.materials import NAMES
 from avn.apartments.floor_plan import FloorPlan
-from avn.apartments.grid import build_grid, source_cells
+from avn.apartments.grid import Grid, build_grid, source_cells
 from avn.apartments.surfaces import build_surfaces, line_of_sight
 from avn.apartments.walls import walls
 from avn.core.errors import UserError
 from avn.core.files import written_whole
-from avn.core.hashing import digest
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene, scene_file
 from avn.dataset.scene import Scene
 
-# Raised when the code of a part changes what it makes. All enter every hash, for cells,
-# reverberation and first arrivals lie in one folder and must be of one making.
-MAKING = {"geometry": 1, "tail": 1, "first_arrival": 1}
-_REGIME = ("name", "first_arrival")
 
+def build_geometry(
+    plan: FloorPlan, acoustics: AcousticsConfig, path: Path, fingerprint: str
+) -> None:
+    """Write the geometry of an apartment.
 
-def geometry_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
-    """Hash of what a geometry file is made from."""
-    heights = (acoustics.ear_height, acoustics.source_height)
-    return digest(plan.to_dict(), heights, MAKING)
-
-
-def tail_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
-    """Hash of what the traced reverberation is made from; the regime is no part of it."""
-    settings = {key: value for key, value in asdict(acoustics).items() if key not in _REGIME}
-    return digest(plan.to_dict(), settings, brir.assets_hash(), MAKING)
-
-
-def first_arrival_hash(plan: FloorPlan, acoustics: AcousticsConfig) -> str:
-    """Hash of what the first arrivals of a regime are made from."""
-    regime = [getattr(acoustics, key) for key in _REGIME]
-    return digest(tail_hash(plan, acoustics), regime)
-
-
-def build_geometry(plan: FloorPlan, acoustics: AcousticsConfig, folder: Path) -> Scene:
-    """Write `geometry.h5` unless it is there, and open the scene.
+    Parameters
+    ----------
+    plan : FloorPlan
+    acoustics : AcousticsConfig
+        Its heights of ears and sources are used.
+    path : Path
+        The file.
+    fingerprint : str
+        What tells this file from those of other plans or settings; it is written into it.
 
     Raises
     ------
     UserError
-        Where the plan's cells do not hang together or a source stands on none.
+        For what `check_plan` refuses.
     """
-    path = scene.geometry_file(folder)
-    made_from = geometry_hash(plan, acoustics)
-    if not path.is_file():
-        grid = build_grid(plan)
-        sources = source_cells(plan, grid)
-        surfaces = build_surfaces(plan)
-        _check_materials(plan)
-        ears = _points(grid.centres, acoustics.ear_height)
-        places = _points(grid.centres[sources], acoustics.source_height)
-        pairs = (len(sources), grid.cells, 3)
-        in_sight = line_of_sight(
-            surfaces,
-            np.broadcast_to(places[:, None], pairs).reshape(-1, 3),
-            np.broadcast_to(ears[None], pairs).reshape(-1, 3),
-        ).reshape(pairs[:2])
+    grid, sources = check_plan(plan)
+    surfaces = build_surfaces(plan)
+    ears = _points(grid.centres, acoustics.ear_height)
+    places = _points(grid.centres[sources], acoustics.source_height)
+    pairs = (len(sources), grid.cells, 3)
+    in_sight = line_of_sight(
+        surfaces,
+        np.broadcast_to(places[:, None], pairs).reshape(-1, 3),
+        np.broadcast_to(ears[None], pairs).reshape(-1, 3),
+    ).reshape(pairs[:2])
 
-        def fill(file: h5py.File) -> None:
-            file["floor_plan"] = plan.to_json()
-            file["lattice"], file["neighbours"] = grid.lattice, grid.neighbours
-            file["states"] = np.stack(np.divmod(np.arange(4 * grid.cells), 4), 1).astype(np.int32)
-            file["distances"], file["rooms"] = grid.distances, grid.rooms
-            file["squares"], file["sources"] = grid.squares, sources
-            file["in_sight"] = in_sight
-            file["materials"] = np.array(surfaces.materials, dtype=h5py.string_dtype())
+    def fill(file: h5py.File) -> None:
+        file["floor_plan"] = plan.to_json()
+        file["lattice"], file["neighbours"] = grid.lattice, grid.neighbours
+        file["states"] = np.stack(np.divmod(np.arange(4 * grid.cells), 4), 1).astype(np.int32)
+        file["distances"], file["rooms"] = grid.distances, grid.rooms
+        file["squares"], file["sources"] = grid.squares, sources
+        file["in_sight"] = in_sight
+        file["materials"] = np.array(surfaces.materials, dtype=h5py.string_dtype())
 
-        scene_file.write(path, "geometry", scene.GEOMETRY_VERSION, made_from, fill)
-    return scene.load(folder, made_from)
+    scene_file.write(path, "geometry", scene.GEOMETRY_VERSION, fingerprint, fill)
+
+
+def check_plan(plan: FloorPlan) -> tuple[Grid, NDArray[np.int32]]:
+    """The grid of a plan and the cells of its sources.
+
+    Raises
+    ------
+    UserError
+        Where its cells do not hang together, a source stands on none, or a material is unknown.
+    """
+    grid = build_grid(plan)
+    sources = source_cells(plan, grid)
+    _check_materials(plan)
+    return grid, sources
 
 
 def _check_materials(plan: FloorPlan) -> None:
@@ -132,59 +129,43 @@ def _render_first_arrivals(job: _Job) -> FirstArrivals:
     return brir.render_first_arrivals(walls(job.plan), source, ears, job.acoustics)
 
 
-def acoustics_made(scenes: Sequence[Scene], acoustics: AcousticsConfig) -> bool:
-    """Whether all files of a regime are there; whether they are whole shows on reading.
-
-    Raises
-    ------
-    UserError
-        Where a file was made from other settings.
-    """
-    return all(_tail_made(s, acoustics) and _first_made(s, acoustics) for s in scenes)
-
-
-def _tail_made(which: Scene, acoustics: AcousticsConfig) -> bool:
-    path = scene.tail_file(which.folder)
-    return scene_file.is_there(path, tail_hash(which.plan, acoustics))
-
-
-def _first_made(which: Scene, acoustics: AcousticsConfig) -> bool:
-    path = scene.first_arrival_file(which.folder, acoustics.name)
-    return scene_file.is_there(path, first_arrival_hash(which.plan, acoustics))
-
-
-def build_acoustics(scenes: Sequence[Scene], acoustics: AcousticsConfig, processes: int) -> None:
-    """Make the acoustics files that are missing, one source a job, in worker processes.
+def build_reverberation(
+    files: Sequence[tuple[Scene, Path, str]], acoustics: AcousticsConfig, processes: int
+) -> None:
+    """Trace the late reverberation of apartments, one source a job, in worker processes.
 
     The results do not depend on the number of processes.
+
+    Parameters
+    ----------
+    files : sequence of (Scene, Path, str)
+        Each apartment, its file, and the fingerprint of it.
+    acoustics : AcousticsConfig
+    processes : int
     """
-    missing = [which for which in scenes if not _tail_made(which, acoustics)]
-    jobs = {which.name: _jobs(which, acoustics) for which in missing}
-    todo = [job for name in jobs for job in jobs[name] if not job.part.is_file()]
-    total = sum(len(job.cells) for which in jobs.values() for job in which)
+    jobs = [_jobs(scene, acoustics, path) for scene, path, _ in files]
+    todo = [job for own in jobs for job in own if not job.part.is_file()]
+    total = sum(len(job.cells) for own in jobs for job in own)
     if total:
         with progress_bar("tracing sound", total, "pairs") as advance:
             advance(total - sum(len(job.cells) for job in todo))
             for done in in_processes(_render_tail, todo, processes):
                 advance(done)
-    for which in missing:
-        _assemble_tail(which, acoustics, jobs[which.name])
-    for which in scenes:
-        if not _first_made(which, acoustics):
-            _write_first_arrivals(which, acoustics)
+    for (own, path, fingerprint), parts in zip(files, jobs, strict=True):
+        _assemble(own, acoustics, parts, path, fingerprint)
 
 
-def _jobs(which: Scene, acoustics: AcousticsConfig) -> list[_Job]:
-    made_from = tail_hash(which.plan, acoustics)
-    parts = which.folder / f".tail-{made_from[:8]}"
-    centres = which.grid.centres
+def _jobs(which: Scene, acoustics: AcousticsConfig, path: Path) -> list[_Job]:
+    parts, centres = path.parent / f".{path.stem}", which.grid.centres
     return [
         _Job(which.plan, acoustics, tuple(centres[cell]), centres, parts / f"source-{k:03d}.npz")
         for k, cell in enumerate(which.sources)
     ]
 
 
-def _assemble_tail(which: Scene, acoustics: AcousticsConfig, jobs: list[_Job]) -> None:
+def _assemble(
+    which: Scene, acoustics: AcousticsConfig, jobs: list[_Job], path: Path, fingerprint: str
+) -> None:
     pairs = (len(jobs), which.grid.cells)
 
     def fill(file: h5py.File) -> None:
@@ -198,22 +179,29 @@ def _assemble_tail(which: Scene, acoustics: AcousticsConfig, jobs: list[_Job]) -
                 for name in ("samples", "scale", "cut_db"):
                     file[name][k] = part[name]
 
-    made_from = tail_hash(which.plan, acoustics)
-    path = scene.tail_file(which.folder)
-    scene_file.write(path, "acoustics-tail", scene.TAIL_VERSION, made_from, fill)
+    scene_file.write(path, "acoustics-tail", scene.TAIL_VERSION, fingerprint, fill)
     shutil.rmtree(jobs[0].part.parent)
 
 
-def _write_first_arrivals(which: Scene, acoustics: AcousticsConfig) -> None:
-    arrivals = [_render_first_arrivals(job) for job in _jobs(which, acoustics)]
+def build_direct_sound(
+    which: Scene, acoustics: AcousticsConfig, path: Path, fingerprint: str
+) -> None:
+    """Write the first arrivals of an apartment in the regime of `acoustics`.
+
+    Parameters
+    ----------
+    which : Scene
+    acoustics : AcousticsConfig
+    path : Path
+        The file.
+    fingerprint : str
+        What tells this file from others; it is written into it.
+    """
+    arrivals = [_render_first_arrivals(job) for job in _jobs(which, acoustics, path)]
 
     def fill(file: h5py.File) -> None:
-        file.attrs["tail_made_from"] = tail_hash(which.plan, acoustics)
         file["samples"] = np.stack([a.samples for a in arrivals])
         file["scale"] = np.stack([a.scale for a in arrivals])
         file["onset"] = np.stack([a.onset for a in arrivals])
 
-    path = scene.first_arrival_file(which.folder, acoustics.name)
-    kind = f"acoustics-{acoustics.name}"
-    made_from = first_arrival_hash(which.plan, acoustics)
-    scene_file.write(path, kind, scene.FIRST_ARRIVAL_VERSION, made_from, fill)
+    scene_file.write(path, "acoustics-first", scene.FIRST_ARRIVAL_VERSION, fingerprint, fill)

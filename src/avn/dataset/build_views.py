@@ -16,46 +16,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
+from avn.apartments.grid import build_grid
 from avn.core.files import written_whole
-from avn.core.hashing import digest
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene_file
-from avn.dataset.scene import Scene
-from avn.dataset.views import VERSION, views_file, views_kind
-from avn.views.models import assets_hash
-from avn.views.renderer import Renderer, RendererConfig, renderer_class
+from avn.dataset.views import KIND, VERSION
+from avn.views.renderer import Prepared, Renderer, RendererConfig, renderer_class
 
-# Raised when the code changes what it makes.
-MAKING = 1
 # Views that are rendered, kept and counted together.
 _CHUNK = 40
 
 
-def views_hash(plan: FloorPlan, part: str, cfg: RendererConfig, look: int = 0) -> str:
-    """Hash of what a file of views is made from.
+@dataclass(frozen=True)
+class ViewsFile:
+    """The views of an apartment, to be made.
 
-    Parameters
+    Attributes
     ----------
     plan : FloorPlan
     part : {"train", "validation", "test"}
         The pool of models, patterns and light.
-    cfg : RendererConfig
     look : int
         Which draw from the pool.
+    path : Path
+        The file.
+    fingerprint : str
+        What tells this file from others; it is written into it.
     """
-    return digest(plan.to_dict(), part, cfg, look, assets_hash(), MAKING)
+
+    plan: FloorPlan
+    part: str
+    look: int
+    path: Path
+    fingerprint: str
 
 
 @dataclass(frozen=True)
 class _Lighting:
     """What a worker needs to light an apartment."""
 
-    plan: FloorPlan
-    part: str
-    look: int
+    views: ViewsFile
     cfg: RendererConfig
-    file: Path
+
+    @property
+    def file(self) -> Path:
+        """Where the light is kept until all views are there."""
+        return self.views.path.parent / f".{self.views.path.stem}" / "light.npz"
 
 
 @dataclass(frozen=True)
@@ -69,81 +76,45 @@ class _Rendering:
     file: Path
 
 
-Apartments = Sequence[tuple[Scene, str]]
-
-
-def views_made(apartments: Apartments, cfg: RendererConfig, looks: Sequence[int] = (0,)) -> bool:
-    """Whether all files of views are there; whether they are whole shows on reading.
-
-    Parameters and errors are those of `build_views`.
-    """
-    return all(
-        scene_file.is_there(
-            views_file(which.folder, cfg.name, look), views_hash(which.plan, part, cfg, look)
-        )
-        for which, part in apartments
-        for look in looks
-    )
-
-
-def build_views(
-    apartments: Apartments, cfg: RendererConfig, processes: int, looks: Sequence[int] = (0,)
-) -> None:
-    """Make the files of views that are missing, in worker processes of one thread each.
+def build_views(files: Sequence[ViewsFile], cfg: RendererConfig, processes: int) -> None:
+    """Render views, in worker processes of one thread each.
 
     The results do not depend on the number of processes.
 
     Parameters
     ----------
-    apartments : sequence of (Scene, str)
-        Scenes, and the part of the split that each belongs to.
+    files : sequence of ViewsFile
     cfg : RendererConfig
     processes : int
-    looks : sequence of int
-        Which looks of each.
 
     Raises
     ------
     UserError
-        Where a file was made from other settings, or the renderer is not installed.
+        Where the settings cannot work, or the renderer is not installed.
     """
     renderer_class(cfg).check(cfg)
-    missing = [
-        (which, part, look)
-        for which, part in apartments
-        for look in looks
-        if not views_made([(which, part)], cfg, [look])
-    ]
-    lightings = [_lighting(*each, cfg) for each in missing]
+    lightings = [_Lighting(own, cfg) for own in files]
     unlit = [job for job in lightings if not job.file.is_file()]
     if unlit:
         with progress_bar("lighting", len(lightings), "apartments") as advance:
             advance(len(lightings) - len(unlit))
             for done in in_processes(_light, unlit, processes):
                 advance(done)
-    chunks = [
-        _renderings(which, light) for (which, _, _), light in zip(missing, lightings, strict=True)
-    ]
+    chunks = [_renderings(light) for light in lightings]
     todo = [job for own in chunks for job in own if not job.file.is_file()]
     if todo:
-        total = sum(4 * which.grid.cells for which, _, _ in missing)
+        total = sum(job.last - job.first for own in chunks for job in own)
         with progress_bar("rendering", total, "views") as advance:
             advance(total - sum(job.last - job.first for job in todo))
             for done in in_processes(_render, todo, processes):
                 advance(done)
         _OPENED.clear()
-    for (which, part, look), own in zip(missing, chunks, strict=True):
-        _assemble(which, part, look, cfg, own)
+    for views, own in zip(files, chunks, strict=True):
+        _assemble(views, cfg, own)
 
 
-def _lighting(which: Scene, part: str, look: int, cfg: RendererConfig) -> _Lighting:
-    made_from = views_hash(which.plan, part, cfg, look)
-    folder = which.folder / f".{views_kind(cfg.name, look)}-{made_from[:8]}"
-    return _Lighting(which.plan, part, look, cfg, folder / "light.npz")
-
-
-def _renderings(which: Scene, lighting: _Lighting) -> list[_Rendering]:
-    centres, folder = which.grid.centres, lighting.file.parent
+def _renderings(lighting: _Lighting) -> list[_Rendering]:
+    centres, folder = build_grid(lighting.views.plan).centres, lighting.file.parent
     states = 4 * len(centres)
     return [
         _Rendering(
@@ -157,8 +128,13 @@ def _renderings(which: Scene, lighting: _Lighting) -> list[_Rendering]:
     ]
 
 
+def _open(job: _Lighting, light: Prepared | None = None) -> Renderer:
+    views = job.views
+    return renderer_class(job.cfg)(job.cfg, views.plan, views.part, views.look, light)
+
+
 def _light(job: _Lighting) -> int:
-    renderer = renderer_class(job.cfg)(job.cfg, job.plan, job.part, job.look)
+    renderer = _open(job)
     with written_whole(job.file) as part, part.open("wb") as file:
         np.savez(file, **renderer.prepare())  # type: ignore[arg-type]
     return 1
@@ -173,7 +149,7 @@ def _renderer(job: _Lighting) -> Renderer:
         with np.load(job.file) as light:
             prepared = dict(light)
         _OPENED.clear()
-        _OPENED[job.file] = renderer_class(job.cfg)(job.cfg, job.plan, job.part, job.look, prepared)
+        _OPENED[job.file] = _open(job, prepared)
     return _OPENED[job.file]
 
 
@@ -185,11 +161,8 @@ def _render(job: _Rendering) -> int:
     return len(states)
 
 
-def _assemble(
-    which: Scene, part: str, look: int, cfg: RendererConfig, chunks: list[_Rendering]
-) -> None:
-    size = cfg.camera.size
-    states = 4 * which.grid.cells
+def _assemble(views: ViewsFile, cfg: RendererConfig, chunks: list[_Rendering]) -> None:
+    size, states = cfg.camera.size, chunks[-1].last
 
     def fill(file: h5py.File) -> None:
         # contiguous, to be memory-mapped
@@ -200,7 +173,5 @@ def _assemble(
                 for name in ("rgb", "depth"):
                     file[name][job.first : job.last] = made[name]
 
-    path = views_file(which.folder, cfg.name, look)
-    made_from = views_hash(which.plan, part, cfg, look)
-    scene_file.write(path, views_kind(cfg.name, look), VERSION, made_from, fill)
+    scene_file.write(views.path, KIND, VERSION, views.fingerprint, fill)
     shutil.rmtree(chunks[0].file.parent)

@@ -1,4 +1,4 @@
-"""Features of an apartment's views as `features-<backbone>.h5` in its scene folder holds them."""
+"""Embeddings of an apartment's views, in a file."""
 
 from __future__ import annotations
 
@@ -8,76 +8,41 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.core.errors import UserError
 from avn.dataset import scene_file
 
+KIND = "features"
 # Raised when the layout of the file changes.
 VERSION = 1
 
 
-def features_kind(backbone: str, look: int = 0) -> str:
-    """What a file of features says it holds; its name too."""
-    return f"features-{backbone}" + (f"-look{look}" if look else "")
-
-
-def features_file(folder: Path, backbone: str, look: int = 0) -> Path:
-    """The file of the features by a backbone of the views in one of an apartment's looks."""
-    return folder / f"{features_kind(backbone, look)}.h5"
-
-
-def write_features(
-    folder: Path,
-    backbone: str,
-    features: NDArray[np.float32],
-    made_from: str,
-    views_made_from: str,
-    look: int = 0,
-) -> None:
+def write_features(path: Path, features: NDArray[np.float32], fingerprint: str) -> None:
     """Store the features of an apartment's views.
 
     Parameters
     ----------
-    folder : Path
-        The scene folder.
-    backbone : str
-        Name of what saw the views.
+    path : Path
     features : (S, D) float32
         Of the S states, 4 x cell + heading; each of length 1.
-    made_from : str
-        Hash of everything they depend on, the views included.
-    views_made_from : str
-        The hash that the views carry.
-    look : int
+    fingerprint : str
+        What tells them from others, the views included.
     """
-    path = features_file(folder, backbone, look)
 
     def fill(file: h5py.File) -> None:
         file["features"] = features.astype(np.float32, copy=False)
-        file.attrs["views_made_from"] = views_made_from
 
-    scene_file.write(path, features_kind(backbone, look), VERSION, made_from, fill)
+    scene_file.write(path, KIND, VERSION, fingerprint, fill)
 
 
-def read_features(
-    folder: Path,
-    backbone: str,
-    states: int,
-    made_from: str | None = None,
-    views_made_from: str | None = None,
-    look: int = 0,
-) -> NDArray[np.float32]:
+def read_features(path: Path, states: int, fingerprint: str | None = None) -> NDArray[np.float32]:
     """The features of an apartment's views.
 
     Parameters
     ----------
-    folder : Path
-        The scene folder.
-    backbone : str
+    path : Path
     states : int
         How many there must be.
-    made_from, views_made_from : str, optional
-        The hashes that they must carry.
-    look : int
+    fingerprint : str, optional
+        The one that the file must carry.
 
     Returns
     -------
@@ -86,17 +51,11 @@ def read_features(
     Raises
     ------
     UserError
-        Where the file is missing, damaged, of another backbone, other views or another shape.
+        Where the file is missing, damaged, of another making or another shape.
     """
-    path, kind = features_file(folder, backbone, look), features_kind(backbone, look)
-    with scene_file.open_checked(path, kind, VERSION, made_from) as file:
+    with scene_file.open_checked(path, KIND, VERSION, fingerprint) as file:
         ndim = file["features"].ndim if "features" in file else 0
         width = file["features"].shape[-1] if ndim == 2 else 0
         scene_file.check_shapes(file, path, {"features": (states, width)})
-        if views_made_from is not None and file.attrs.get("views_made_from") != views_made_from:
-            raise UserError(
-                f"{path}: features of other views than those that lie beside it; delete it and "
-                "run the command again to make it anew"
-            )
         found: NDArray[np.float32] = file["features"][()]
     return found

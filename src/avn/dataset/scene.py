@@ -1,4 +1,4 @@
-"""A scene folder: what an apartment is, how it sounds, read back from its files."""
+"""Scenes: the geometry of an apartment and its impulse responses, read back from files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from avn.apartments.floor_plan import FloorPlan, from_dict
 from avn.apartments.grid import Grid
 from avn.core.errors import UserError
 from avn.dataset import scene_file
-from avn.dataset.views import Views, read_views
 
 # Raised when the layout of a file changes.
 GEOMETRY_VERSION = 1
@@ -23,54 +22,37 @@ TAIL_VERSION = 1
 FIRST_ARRIVAL_VERSION = 1
 
 
-def tail_file(folder: Path) -> Path:
-    """The file of the traced reverberation, which the regimes share."""
-    return folder / "acoustics-tail.h5"
-
-
-def first_arrival_file(folder: Path, regime: str) -> Path:
-    """The file of the first arrivals of a regime."""
-    return folder / f"acoustics-{regime}.h5"
-
-
-def geometry_file(folder: Path) -> Path:
-    """The file of the floor plan and its grid."""
-    return folder / "geometry.h5"
-
-
 class Brirs:
     """Binaural room impulse responses of one apartment in one regime.
 
     Parameters
     ----------
-    folder : Path
-        The scene folder.
-    regime : str
-        `resonance` or `diffraction`.
+    tail, first : (Path, str)
+        The files of the late reverberation and of the direct sound, and their fingerprints.
     sources, cells : int
         How many there must be.
-    made_from : str, optional
-        The hash that the first arrivals must carry.
 
     Attributes
     ----------
     samples : int
         Length T of a response, at 16 kHz.
+
+    Raises
+    ------
+    UserError
+        Where a file is missing, damaged or of another making.
     """
 
     def __init__(
-        self, folder: Path, regime: str, sources: int, cells: int, made_from: str | None = None
+        self, tail: tuple[Path, str], first: tuple[Path, str], sources: int, cells: int
     ) -> None:
         pairs = (sources, cells)
         self._tail, self._tail_scale, marks = _read(
-            tail_file(folder), "acoustics-tail", TAIL_VERSION, pairs, None, memory_map=True
+            tail, "acoustics-tail", TAIL_VERSION, pairs, memory_map=True
         )
-        path = first_arrival_file(folder, regime)
         self._first, self._first_scale, first_marks = _read(
-            path, f"acoustics-{regime}", FIRST_ARRIVAL_VERSION, pairs, made_from, memory_map=False
+            first, "acoustics-first", FIRST_ARRIVAL_VERSION, pairs, memory_map=False
         )
-        if first_marks["tail_made_from"] != marks["made_from"]:
-            raise UserError(f"{path}: belongs to another acoustics-tail.h5; make the scene again")
         self._onset = torch.from_numpy(first_marks["onset"].astype(np.int64))
         self.samples = int(self._tail.shape[-1])
         self.cut_db: NDArray[np.float32] = marks["cut_db"]
@@ -103,18 +85,13 @@ class Brirs:
 
 
 def _read(
-    path: Path,
-    kind: str,
-    version: int,
-    pairs: tuple[int, int],
-    made_from: str | None,
-    memory_map: bool,
+    from_file: tuple[Path, str], kind: str, version: int, pairs: tuple[int, int], memory_map: bool
 ) -> tuple[NDArray[np.int16], NDArray[np.float32], dict[str, Any]]:
-    with scene_file.open_checked(path, kind, version, made_from) as file:
+    path, fingerprint = from_file
+    with scene_file.open_checked(path, kind, version, fingerprint) as file:
         samples = file["samples"].shape[-1] if "samples" in file else 0
         scene_file.check_shapes(file, path, {"samples": (*pairs, 4, 2, samples), "scale": pairs})
-        marks = dict(file.attrs)
-        marks.update({name: file[name][()] for name in ("onset", "cut_db") if name in file})
+        marks = {name: file[name][()] for name in ("onset", "cut_db") if name in file}
         scale = file["scale"][()]
         dataset = file["samples"]
         if memory_map:
@@ -126,12 +103,12 @@ def _read(
 
 @dataclass(frozen=True)
 class Scene:
-    """An apartment as its scene folder holds it.
+    """The geometry of an apartment.
 
     Attributes
     ----------
     folder : Path
-        The scene folder.
+        The scene folder, which also holds its sound and its views.
     plan, grid : FloorPlan, Grid
         What is built, and its C cells.
     sources : (K,) int32
@@ -151,19 +128,34 @@ class Scene:
         """Name of the apartment."""
         return self.plan.name
 
-    def brirs(self, regime: str, made_from: str | None = None) -> Brirs:
-        """The impulse responses of a regime; raises `UserError` where they are not there."""
-        return Brirs(self.folder, regime, len(self.sources), self.grid.cells, made_from)
-
-    def views(self, renderer: str, made_from: str | None = None, look: int = 0) -> Views:
-        """The views by a renderer; raises `UserError` where they are not there."""
-        return read_views(self.folder, renderer, 4 * self.grid.cells, made_from, look)
+    def with_brirs(self, brirs: Brirs) -> AudibleScene:
+        """The same apartment with its impulse responses."""
+        return AudibleScene(**vars(self), brirs=brirs)
 
 
-def load(folder: Path, made_from: str | None = None) -> Scene:
-    """Open a scene folder; raises `UserError` where its geometry is missing or damaged."""
-    path = geometry_file(folder)
-    with scene_file.open_checked(path, "geometry", GEOMETRY_VERSION, made_from) as file:
+@dataclass(frozen=True)
+class AudibleScene(Scene):
+    """An apartment with its binaural room impulse responses in one regime."""
+
+    brirs: Brirs
+
+
+def load_scene(path: Path, fingerprint: str | None = None) -> Scene:
+    """Open an apartment.
+
+    Parameters
+    ----------
+    path : Path
+        Its `geometry-*.h5`.
+    fingerprint : str, optional
+        The one that the file must carry.
+
+    Raises
+    ------
+    UserError
+        Where the file is missing, damaged or of another making.
+    """
+    with scene_file.open_checked(path, "geometry", GEOMETRY_VERSION, fingerprint) as file:
         data = {name: file[name][()] for name in file}
     try:
         plan = from_dict(json.loads(data["floor_plan"]), str(path))
@@ -181,4 +173,4 @@ def load(folder: Path, made_from: str | None = None) -> Scene:
                 raise UserError(f"{path}: '{name}' is {data[name].shape}, not {shape}; make again")
     except (KeyError, ValueError) as error:
         raise UserError(f"{path}: incomplete ({error}); make the scene again") from error
-    return Scene(folder, plan, grid, data["sources"], data["in_sight"].astype(bool))
+    return Scene(path.parent, plan, grid, data["sources"], data["in_sight"].astype(bool))

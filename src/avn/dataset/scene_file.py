@@ -78,27 +78,6 @@ def open_checked(path: Path, kind: str, version: int, made_from: str | None = No
         raise UserError(f"{path}: {_damage(path) or 'not an HDF5 file'}; {_MEND}") from error
 
 
-def is_there(path: Path, made_from: str) -> bool:
-    """Whether a file lies there; cheap, for whether it is whole shows on reading.
-
-    Raises
-    ------
-    UserError
-        Where it was made from something else.
-    """
-    if not path.is_file():
-        return False
-    try:
-        with h5py.File(path, "r") as file:
-            found = file.attrs.get("made_from")
-            version = file.attrs.get("version")
-    except (OSError, KeyError, RuntimeError, ValueError):
-        return True  # damaged: the reader says how
-    if found != made_from and version is not None:
-        raise UserError(f"{path}: made from another floor plan or other settings; {_MEND}")
-    return True
-
-
 def check_shapes(file: h5py.File, path: Path, shapes: dict[str, tuple[int, ...]]) -> None:
     """Raise `UserError` where a dataset is missing or has another shape than it must."""
     for name, shape in shapes.items():

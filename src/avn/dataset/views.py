@@ -1,4 +1,4 @@
-"""The views of an apartment as `views-<renderer>.h5` in its scene folder holds them."""
+"""The views of an apartment, read back from their file."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from avn.dataset import scene_file
 
+KIND = "views"
 # Raised when the layout of the file changes.
 VERSION = 1
 
@@ -31,39 +32,24 @@ class Views:
     depth: NDArray[np.float16]
 
 
-def views_kind(renderer: str, look: int) -> str:
-    """What a file of views says it holds; its name too."""
-    return f"views-{renderer}" + (f"-look{look}" if look else "")
-
-
-def views_file(folder: Path, renderer: str, look: int = 0) -> Path:
-    """The file of the views by a renderer in one of an apartment's looks."""
-    return folder / f"{views_kind(renderer, look)}.h5"
-
-
-def read_views(
-    folder: Path, renderer: str, states: int, made_from: str | None = None, look: int = 0
-) -> Views:
-    """Open the views of a scene folder.
+def read_views(path: Path, states: int, fingerprint: str | None = None) -> Views:
+    """Open the views of an apartment.
 
     Parameters
     ----------
-    folder : Path
-    renderer : str
+    path : Path
+        Its `views-*.h5`.
     states : int
         How many there must be.
-    made_from : str, optional
-        The hash that they must carry.
-    look : int
+    fingerprint : str, optional
+        The one that the file must carry.
 
     Raises
     ------
     UserError
         Where the file is missing, damaged or of another making.
     """
-    path = views_file(folder, renderer, look)
-    kind = views_kind(renderer, look)
-    with scene_file.open_checked(path, kind, VERSION, made_from) as file:
+    with scene_file.open_checked(path, KIND, VERSION, fingerprint) as file:
         size = file["rgb"].shape[1] if "rgb" in file and file["rgb"].ndim == 4 else 0
         shapes = {"rgb": (states, size, size, 3), "depth": (states, size, size)}
         scene_file.check_shapes(file, path, shapes)

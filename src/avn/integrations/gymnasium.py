@@ -14,13 +14,23 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
+from hydra.utils import instantiate
 from numpy.typing import NDArray
 from torch import Tensor
 
 from avn.config import schema
 from avn.config.folder import conf_folder
+from avn.core.errors import UserError
+from avn.core.settings import typed
+from avn.navigation.protocols import Protocol
+from avn.navigation.starts import build_starts
+from avn.navigation.tables import Tables
 from avn.navigation.world import World
 from avn.pipeline import policy
+from avn.pipeline.occupancy import sees_windows
+from avn.pipeline.sound_network import hears
+from avn.pipeline.stage import build
+from avn.rl.config import A3CConfig, check_recipe
 from avn.rl.environment import WalkEnv
 
 Observation = dict[str, NDArray[Any]]
@@ -139,17 +149,26 @@ def _world(
     observes: Sequence[str] | None,
     max_steps: int | None,
 ) -> tuple[World, Sequence[str]]:
-    (tables, protocol, recipe), default = _tables(overrides, part)
-    world = policy.free_world(tables, protocol, recipe, n, max_steps)
+    tables, default, protocol, recipe = _tables(overrides, part)
+    starts = build_starts(tables)
+    world = World(tables, starts, n, protocol, max_steps, recipe.reward, recipe.train_seed)
     return world, observes or default
 
 
 @lru_cache(maxsize=4)
-def _tables(overrides: tuple[str, ...], part: str) -> tuple[Any, tuple[str, ...]]:
+def _tables(
+    overrides: tuple[str, ...], part: str
+) -> tuple[Tables, tuple[str, ...], Protocol, A3CConfig]:
     # many environments of one process look into the same tables
     cfg = _config(overrides)
-    names = policy.observed_names(cfg)
-    return policy.open_tables(cfg, part), names
+    if part not in policy.PARTS:
+        raise UserError(f"part: '{part}' is none of {', '.join(policy.PARTS)}")
+    for stage in policy.part_stages(cfg, part):
+        build(stage)
+    tables = policy.tables_of(cfg, policy.load_part(cfg, part))
+    heard = ("sound_feature",) if hears(cfg) else ()
+    names = ("feature", *heard, *(("map",) if sees_windows(cfg) else ()))
+    return tables, names, instantiate(cfg.protocol), check_recipe(typed(cfg.a3c))
 
 
 def _config(overrides: tuple[str, ...]) -> Any:

@@ -10,6 +10,10 @@ from avn.agents.base import Agent
 from avn.core.errors import UserError
 from avn.modules.network import build_part
 from avn.pipeline import policy, stop_classifier
+from avn.pipeline.stage import Stage
+
+# Settings of the node `mapper` that are no arguments of the mapper.
+_OTHERS = ("name", "visible_above")
 
 
 def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
@@ -18,8 +22,7 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
     Parameters
     ----------
     ready : bool
-        Whether it shall walk: then it knows from when to say Stop, for which the stop classifier
-        is trained where it is missing.
+        Whether it shall act: then its network is read, and from when on to say Stop.
 
     Raises
     ------
@@ -33,7 +36,9 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
         )
     if cfg.baseline._target_:
         check_no_truth(cfg)
-        learnt = policy.parts(cfg, ready) if policy.learns(cfg) else {}
+        learnt = policy.parts(cfg) if policy.learns(cfg) else {}
+        if learnt and ready:
+            learnt["network"] = policy.Policy(cfg).load()
         return build_part(cfg.baseline, "baseline", **learnt)
     if not cfg.planner._target_:
         raise UserError(
@@ -43,17 +48,44 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
     if not cfg.mapper._target_:
         raise UserError("mapper: 'none' remembers nothing to plan on; choose occupancy")
     given: dict[str, Any] = {"mapper": build_part(_settings(cfg.mapper)), "truth": cfg.agent.truth}
-    if ready and cfg.protocol.says_stop and stop_classifier.can_stop(cfg):
-        given["stop_at"] = stop_classifier.stop_threshold(cfg)
+    if ready and decides(cfg):
+        given["stop_at"] = stop_classifier.StopNetwork(cfg).threshold()
     return build_part(cfg.planner, **given)
 
 
-def acting(cfg: DictConfig) -> list[Any]:
-    """The settings by which it acts, for the hash of a run."""
+def decides(cfg: DictConfig) -> bool:
+    """Whether the agent says Stop by the probability of the stop classifier."""
+    return bool(cfg.planner._target_ and cfg.protocol.says_stop and stop_classifier.can_stop(cfg))
+
+
+def agent_stages(cfg: DictConfig) -> list[Stage]:
+    """The networks that the agent acts with, beside those that make what it observes."""
+    if policy.learns(cfg):
+        return [policy.Policy(cfg)]
+    if decides(cfg) and cfg.stop_model.threshold is None:
+        return [stop_classifier.StopNetwork(cfg)]
+    return []
+
+
+def agent_settings(cfg: DictConfig) -> list[str]:
+    """Keys of the config by which it acts."""
     if not cfg.planner._target_:
-        learnt = [policy.policy_hash(cfg)] if policy.learns(cfg) else []
-        return [cfg.baseline, *learnt]
-    return [cfg.planner, _settings(cfg.mapper)]
+        return ["baseline"]
+    decision: list[str] = []
+    if decides(cfg):
+        chosen = cfg.stop_model.threshold is None
+        decision = ["stop_model.threshold", *(["stop_model.criterion"] if chosen else [])]
+    return ["planner", "mapper", *decision]
+
+
+def agent_ignored(cfg: DictConfig) -> list[str]:
+    """Keys below those of `agent_settings` that make no difference to it."""
+    unread = [f"mapper.{name}" for name in _OTHERS]
+    if cfg.planner.get("source") == "newest":
+        unread.append("planner.error")  # estimates are not weighed
+    if policy.learns(cfg):
+        unread += [key for key in policy.Policy(cfg).ignored() if key != "baseline.samples"]
+    return unread
 
 
 def check_no_truth(cfg: DictConfig) -> None:
@@ -63,7 +95,6 @@ def check_no_truth(cfg: DictConfig) -> None:
 
 
 def _settings(mapper: DictConfig) -> dict[str, Any]:
-    """The mapper's own settings, without the recipe of its network."""
+    """What the mapper's class takes."""
     node: Any = OmegaConf.to_container(mapper, resolve=True)
-    others = ("name", "visible_above")
-    return {key: value for key, value in node.items() if key not in others}
+    return {key: value for key, value in node.items() if key not in _OTHERS}

@@ -1,37 +1,36 @@
-"""What a network makes of every clip of an apartment, once for all walks through it."""
+"""What a network makes of every clip of an apartment, once for all episodes in it."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from functools import cache
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import torch
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
-from avn.acoustics.dry_sounds import BUILTIN, content_hash, load_sounds
 from avn.core.errors import UserError
-from avn.core.files import check_name
 from avn.core.prefetch import made_ahead, threads_for_one_operation
 from avn.core.progress import progress_bar
-from avn.dataset import build
-from avn.dataset.scene import Scene
+from avn.core.settings import typed
+from avn.dataset.scene import AudibleScene, Scene
 from avn.dataset.source_locations import where_sources_are
 from avn.modules.listener import Listener
 from avn.modules.sound_metrics import location_errors
-from avn.pipeline import scenes
-from avn.pipeline.per_scene import Outcome
-from avn.reporting.results import ALL_SOUNDS
+from avn.pipeline.apartments import Apartments
+from avn.pipeline.per_scene import ApartmentTensors
+from avn.pipeline.scenes import DirectSound
+from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
+from avn.pipeline.trained import Fitted
 
 # Clips rendered at once; more would leave the caches of a CPU.
 BATCH = 96
-# What networks are trained on, whatever `sound=` says.
-TRAINING_SOUNDS = {name: name for name in BUILTIN}
 # Draws the takes of what is heard; an episode draws among them from its own seed.
 HEARING_SEED = 0
 MOST_TAKES = 1000
@@ -39,100 +38,108 @@ MOST_TAKES = 1000
 CLIPS_PER_SECOND = 800
 
 
-def sound_files(cfg: DictConfig) -> dict[str, str]:
-    """The node `sound`: name to built-in recording or path.
+@dataclass(frozen=True)
+class Clips:
+    """Which clips are listened to.
 
-    Raises
-    ------
-    UserError
-        For a name that tables and folders need for something else.
+    Attributes
+    ----------
+    takes : str
+        The key of the config that says how many takes there are of each clip.
+    purpose : {"eval", "train"}
+        Takes of the one are never those of the other.
     """
-    sounds = {str(name): str(path) for name, path in cfg.sound.items()}
-    for name in sounds:
-        check_name("sound", name)
-        if name == ALL_SOUNDS:
-            raise UserError(f"sound: '{name}' is the row of all sounds; rename it")
-    return sounds
+
+    takes: str = "takes"
+    purpose: str = "eval"
 
 
-def training_clips_hash(cfg: DictConfig) -> tuple[Any, ...]:
-    """What every network that listens is trained on, for its hash."""
-    acoustics = scenes.acoustics_of(cfg)
-    apartments = {
-        part: [build.first_arrival_hash(plan, acoustics) for plan in scenes.plans(cfg)[part]]
-        for part in ("train", "validation")
-    }
-    return apartments, content_hash(TRAINING_SOUNDS), cfg.microphone
-
-
-def training_time(cfg: DictConfig, recipe: DictConfig) -> float:
-    """Seconds that training takes on two cores, roughly."""
-    return float(4 * scenes.pairs(cfg, "train")[0] * recipe.epochs / 600)
-
-
-def training_set(cfg: DictConfig) -> dict[str, Any]:
-    """What every network that listens is trained on, for its data module."""
-    return {
-        **scenes.scenes(cfg, ("train", "validation"), audible=True),
-        "regime": cfg.acoustics.name,
-        "sounds": DrySounds(load_sounds(TRAINING_SOUNDS)),
-        "microphone": scenes.typed(cfg.microphone),
-    }
-
-
-def heard_clips(cfg: DictConfig) -> tuple[Any, ...]:
-    """Which clips are listened to, for a hash."""
-    if not 1 <= cfg.takes <= MOST_TAKES:
-        raise UserError(f"takes: {cfg.takes} is out of range; give 1 to {MOST_TAKES}")
-    return list(content_hash(sound_files(cfg)).items()), cfg.takes, HEARING_SEED
-
-
-def listening_time(cfg: DictConfig, chosen: Sequence[Scene]) -> float:
-    """Seconds that listening to every clip of some scenes takes on two cores, roughly."""
-    clips = sum(4 * s.grid.cells * len(s.sources) for s in chosen) * len(cfg.sound) * cfg.takes
-    return clips / CLIPS_PER_SECOND
-
-
-def listen(
-    cfg: DictConfig, chosen: Sequence[Scene], open_model: Callable[[], Listener], outcome: Outcome
-) -> list[Tensor]:
-    """What a network makes of every clip of some scenes, made where it is missing.
+class AudioInference(ApartmentTensors):
+    """What a network makes of every clip of apartments.
 
     Parameters
     ----------
     cfg : DictConfig
-    chosen : sequence of Scene
-    open_model : callable
-        Gives the trained network; called only where something is missing.
-    outcome : Outcome
-        The stage that keeps what the network says.
-
-    Returns
-    -------
-    list of (K, S, sounds, takes, ...) float32 tensor
-        Of each scene; see `hear`.
+    apartments : Apartments
+        The sounds and the microphone are those of their world.
+    clips : Clips
     """
-    acoustics = scenes.acoustics_of(cfg)
-    model = cache(open_model)
 
-    def hear_scene(scene: Scene) -> Tensor:
-        return hear(
-            scene,
-            acoustics.name,
-            DrySounds(load_sounds(sound_files(cfg))),
-            model(),
-            cfg.takes,
-            scenes.typed(cfg.microphone),
-            seed=HEARING_SEED,
+    def __init__(self, cfg: DictConfig, apartments: Apartments, clips: Clips | None = None) -> None:
+        super().__init__(cfg, apartments)
+        self.clips = clips or Clips()
+
+    @property
+    @abstractmethod
+    def network(self) -> Fitted:
+        """The stage of the network that listens."""
+
+    def answer(self, model: Any) -> Callable[[Tensor], Tensor]:
+        """What is made of a batch of clips."""
+        found: Callable[[Tensor], Tensor] = model
+        return found
+
+    @property
+    def takes(self) -> int:
+        """How many takes there are of each clip."""
+        return int(OmegaConf.select(self.cfg, self.clips.takes))
+
+    def needs(self) -> Sequence[Any]:
+        """The network, and the sound of the apartments."""
+        return (self.network, DirectSound(self.cfg, self.apartments))
+
+    def settings(self) -> Sequence[str]:
+        """The microphone, and how many takes there are."""
+        return (self.apartments.world.microphone, self.clips.takes)
+
+    def consulted(self) -> Sequence[str]:
+        """The sounds, whose recordings are in the fingerprint."""
+        return (*super().consulted(), self.apartments.world.sounds)
+
+    def content(self) -> Any:
+        """The recordings, and what draws the takes."""
+        return (
+            sounds_content(self.cfg, self.apartments.world),
+            self.clips.purpose,
+            HEARING_SEED,
         )
 
-    apartments = [build.first_arrival_hash(scene.plan, acoustics) for scene in chosen]
-    return outcome.of(cfg, chosen, apartments, hear_scene)
+    def seconds(self) -> float:
+        """By the number of clips."""
+        sounds = len(sound_files(self.cfg, self.apartments.world))
+        return 4 * self.apartments.pairs * sounds * self.takes / CLIPS_PER_SECOND
+
+    def check(self) -> None:
+        """Refuse a number of takes that cannot be."""
+        if not 1 <= self.takes <= MOST_TAKES:
+            raise UserError(
+                f"{self.clips.takes}: {self.takes} is out of range; give 1 to {MOST_TAKES}"
+            )
+
+    def opened(self) -> Callable[[int], Tensor]:
+        """Open the network and the scenes, and give what listens in one of them."""
+        network, sound = self.needs()
+        model, scenes = network.load(), sound.load()
+        sounds = dry_sounds(self.cfg, self.apartments.world)
+        microphone = typed(self.apartments.node("microphone"))
+
+        def listen(index: int) -> Tensor:
+            return hear(
+                scenes[index],
+                sounds,
+                model,
+                self.takes,
+                microphone,
+                seed=HEARING_SEED,
+                purpose=self.clips.purpose,
+                answer=self.answer(model),
+            )
+
+        return listen
 
 
 def hear(
-    scene: Scene,
-    regime: str,
+    scene: AudibleScene,
     sounds: DrySounds,
     model: Listener,
     takes: int,
@@ -146,10 +153,8 @@ def hear(
 
     Parameters
     ----------
-    scene : Scene
+    scene : AudibleScene
         An apartment with K sources and S = 4 C states.
-    regime : str
-        Which of its impulse responses.
     sounds : DrySounds
     model : Listener
         Trained; it is set to evaluation.
@@ -170,7 +175,7 @@ def hear(
     (K, S, sounds, takes, ...) float32 tensor
         The model's answer to each clip; for the sound network 2 metres, right and front.
     """
-    brirs = scene.brirs(regime)
+    brirs = scene.brirs
     renderer = ClipRenderer(sounds, microphone, seed, purpose)
     sources, states = len(scene.sources), 4 * len(scene.grid.lattice)
     source, state = torch.cartesian_prod(torch.arange(sources), torch.arange(states)).unbind(1)

@@ -14,7 +14,6 @@ from rich.table import Table
 from rich.text import Text
 
 from avn.core.progress import bars_in, progress_columns, span
-from avn.pipeline.stage import Stage
 
 # Lines beside the stages and rows: headings, stages taken together, bars, time.
 _OTHERS = 8
@@ -25,8 +24,8 @@ class Dashboard:
 
     Parameters
     ----------
-    stages : sequence of Stage
-        What is missing, in the order in which it is made.
+    stages : sequence of (str, float)
+        What is missing, in the order in which it is made: title and expected seconds.
     rows : sequence of str
         The rows of the table.
     paper : dict of str to str
@@ -37,7 +36,7 @@ class Dashboard:
 
     def __init__(
         self,
-        stages: Sequence[Stage],
+        stages: Sequence[tuple[str, float]],
         rows: Sequence[str],
         paper: dict[str, str],
         console: Console | None = None,
@@ -84,7 +83,7 @@ class Dashboard:
 
     def time_left(self) -> float:
         """Seconds that it still takes, at the pace of the stages that were made."""
-        planned = [stage.seconds for stage in self._stages]
+        planned = [seconds for _, seconds in self._stages]
         done = len(self._took)
         expected = sum(planned[:done])
         pace = sum(self._took) / expected if expected > 60.0 else 1.0
@@ -110,16 +109,16 @@ class Dashboard:
         last = first + lines
         if first:
             table.add_row(f"{first} stages", "", span(sum(self._took[:first])), style="dim")
-        for number, stage in list(enumerate(self._stages))[first:last]:
+        for number, (title, seconds) in list(enumerate(self._stages))[first:last]:
             took, style = "", ""
             if number < done:
                 took, style = span(self._took[number]), "green"
             elif number == done:
                 took, style = f"{span(time.monotonic() - self._began)} ...", "bold yellow"
-            table.add_row(Text(stage.what), span(stage.seconds), took, style=style)
+            table.add_row(Text(title), span(seconds), took, style=style)
         rest = self._stages[last:]
         if rest:
-            planned = span(sum(stage.seconds for stage in rest))
+            planned = span(sum(seconds for _, seconds in rest))
             table.add_row(f"{len(rest)} more stages", planned, "", style="dim")
         return table
 

@@ -8,12 +8,17 @@ import numpy as np
 import torch
 from omegaconf import DictConfig
 
-from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra, export_wav
-from avn.acoustics.dry_sounds import load_sounds
+from avn.acoustics.clips import ClipRenderer, brir_spectra, export_wav
 from avn.core.errors import UserError
 from avn.core.progress import tell
-from avn.dataset.scene import Scene
-from avn.pipeline import audio_inference, scenes
+from avn.core.settings import leaves, typed
+from avn.dataset.scene import AudibleScene, Scene
+from avn.dataset.views import Views
+from avn.pipeline.apartments import apartments_of_every_part
+from avn.pipeline.scenes import DirectSound
+from avn.pipeline.sounds import dry_sounds
+from avn.pipeline.stage import Stage, make, missing
+from avn.pipeline.views import RenderedViews
 from avn.reporting.contact_sheet import save_contact_sheet
 from avn.reporting.floor_plan_figure import save_floor_plan
 
@@ -31,7 +36,7 @@ def generate(cfg: DictConfig) -> Path:
     Returns
     -------
     Path
-        The folder of the scene folders.
+        The folder that the folders of the apartments lie in.
 
     Raises
     ------
@@ -42,36 +47,51 @@ def generate(cfg: DictConfig) -> Path:
         raise UserError(f"export: '{cfg.export}' is none of {', '.join(EXPORTS)}")
     if cfg.export is None and (cfg.clips or cfg.apartments):
         raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
-    parts = [part for part, found in scenes.plans(cfg).items() if found]
-    opened = scenes.scenes(cfg, parts, audible=True, asked=True)
-    scenes.seen_scenes(cfg, parts, asked=True)
-    hashes = scenes.views_hashes(cfg, parts)
-    every = [which for part in parts for which in opened[part]]
-    made = [own for part in parts for own in hashes[part]]
-    for which, made_from in zip(every, made, strict=True):
-        save_floor_plan(which.plan, which.folder / "floor_plan.png", which.grid)
-        sheet = which.folder / f"contact_sheet-{cfg.renderer.name}.png"
-        views = which.views(cfg.renderer.name, made_from)
-        save_contact_sheet(which.plan, which.grid, views.rgb, sheet)
-        _report(cfg, which)
+    for stage in missing(stages_of(cfg)):
+        make(stage, asked=True)
+    every: list[AudibleScene] = []
+    for apartments in apartments_of_every_part(cfg):
+        sound, rendered = DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
+        for scene, views in zip(sound.load(), rendered.load(), strict=True):
+            _draw(cfg, scene, views)
+            _report(cfg, scene)
+            every.append(scene)
     if cfg.export == "wav":
         _export(cfg, _chosen(cfg, every))
-    return scenes.scenes_folder(cfg)
+    return Path(cfg.outputs) / "generate"
 
 
-def _report(cfg: DictConfig, which: Scene) -> None:
-    brirs = which.brirs(cfg.acoustics.name)  # reading it also shows that the files are whole
-    share = np.mean(10 ** (brirs.cut_db / 10))
+def stages_of(cfg: DictConfig) -> list[Stage]:
+    """The sound and the views of every part of the split."""
+    every = apartments_of_every_part(cfg)
+    return [kind(cfg, own) for kind in (DirectSound, RenderedViews) for own in every]
+
+
+def settings_of(cfg: DictConfig) -> set[str]:
+    """Leaf keys of the config that are read."""
+    own = ["apartments", "export", "clips"]
+    heard = ["sound", "microphone"] if cfg.export == "wav" else []
+    return leaves(cfg, [*own, *heard]).union(*(stage.read() for stage in stages_of(cfg)))
+
+
+def _draw(cfg: DictConfig, scene: AudibleScene, views: Views) -> None:
+    save_floor_plan(scene.plan, scene.folder / "floor_plan.png", scene.grid)
+    sheet = scene.folder / f"contact_sheet-{cfg.renderer.name}.png"
+    save_contact_sheet(scene.plan, scene.grid, views.rgb, sheet)
+
+
+def _report(cfg: DictConfig, scene: AudibleScene) -> None:
+    share = np.mean(10 ** (scene.brirs.cut_db / 10))
     mean = 10 * np.log10(share) if share > 0 else -np.inf
-    size = sum(path.stat().st_size for path in which.folder.glob("*.h5")) / 1e6
+    size = sum(path.stat().st_size for path in scene.folder.glob("*.h5")) / 1e6
     tell(
-        f"{which.name}: {which.grid.cells} cells, {len(which.plan.rooms)} rooms, "
-        f"{len(which.sources)} sources, {size:.0f} MB; energy after {cfg.acoustics.seconds} s: "
-        f"{mean:.0f} dB of the reverberation on average, {brirs.cut_db.max():.0f} dB at most"
+        f"{scene.folder}: {scene.grid.cells} cells, {len(scene.plan.rooms)} rooms, "
+        f"{len(scene.sources)} sources, {size:.0f} MB; energy after {cfg.acoustics.seconds} s: "
+        f"{mean:.0f} dB of the reverberation on average, {scene.brirs.cut_db.max():.0f} dB at most"
     )
 
 
-def _chosen(cfg: DictConfig, every: list[Scene]) -> list[Scene]:
+def _chosen(cfg: DictConfig, every: list[AudibleScene]) -> list[AudibleScene]:
     names = [which.name for which in every]
     for name in cfg.apartments:
         if name not in names:
@@ -79,14 +99,14 @@ def _chosen(cfg: DictConfig, every: list[Scene]) -> list[Scene]:
     return [which for which in every if not cfg.apartments or which.name in cfg.apartments]
 
 
-def _export(cfg: DictConfig, chosen: list[Scene]) -> None:
-    sounds = DrySounds(load_sounds(audio_inference.sound_files(cfg)))
-    render = ClipRenderer(sounds, scenes.typed(cfg.microphone), seed=0, purpose="eval")
+def _export(cfg: DictConfig, chosen: list[AudibleScene]) -> None:
+    sounds = dry_sounds(cfg)
+    render = ClipRenderer(sounds, typed(cfg.microphone), seed=0, purpose="eval")
     for which in chosen:
         pairs = [tuple(pair) for pair in cfg.clips] or _near_and_far(which)
         _check_pairs(which, pairs)
         source, state = (torch.tensor(column) for column in zip(*pairs, strict=True))
-        spectra = brir_spectra(which.brirs(cfg.acoustics.name).gather(source, state))
+        spectra = brir_spectra(which.brirs.gather(source, state))
         for index, name in enumerate(sounds.names):
             sound = torch.full_like(source, index)
             clips = render.render(spectra, source, state, sound, torch.zeros_like(source))

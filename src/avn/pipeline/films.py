@@ -7,13 +7,12 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from avn.core.errors import UserError
-from avn.core.files import check_name
-from avn.core.progress import tell
+from avn.core.files import check_name, locked
+from avn.core.progress import span, tell
 from avn.pipeline import replay
 from avn.pipeline.observed import Perceived, soundtrack
 from avn.pipeline.replay import Run
 from avn.pipeline.run import read_run
-from avn.pipeline.stage import make_once
 from avn.reporting.film import write_film
 
 FOLDER = "films"
@@ -52,13 +51,10 @@ def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
     paths = {label: folder / FOLDER / _name(run, label) for label in labels}
     missing = [label for label in labels if not paths[label].is_file()]
     if missing:
-        make_once(
-            folder / FOLDER,
-            f"{'film' if len(missing) == 1 else f'{len(missing)} films'} of '{cfg.agent.name}'",
-            done=lambda: all(path.is_file() for path in paths.values()),
-            make=lambda: _write(run, {label: paths[label] for label in missing}),
-            seconds=len(missing) * 15,
-        )
+        what = "film" if len(missing) == 1 else f"{len(missing)} films"
+        tell(f"{what} of '{cfg.agent.name}' missing: making (about {span(15.0 * len(missing))})")
+        with locked(folder / FOLDER, what):
+            _write(run, {label: paths[label] for label in missing})
     for path in paths.values():
         tell(str(path))
     return list(paths.values())

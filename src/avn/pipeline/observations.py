@@ -1,124 +1,208 @@
-"""What an agent hears and sees in the apartments that it walks, made where it is missing."""
+"""What agents hear and see: a table of observations, each with the stage that makes it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import torch
 from omegaconf import DictConfig
 from torch import Tensor
 
+from avn.agents.rollout import missing_observation
+from avn.core.settings import typed
 from avn.dataset.scene import Scene
 from avn.dataset.source_locations import where_sources_are
-from avn.pipeline import (
-    audio_features,
-    occupancy,
-    scenes,
-    sound_network,
-    stop_classifier,
-    visual_features,
-)
+from avn.pipeline.apartments import Apartments
+from avn.pipeline.audio_features import AudioEmbeddings
+from avn.pipeline.audio_inference import Clips
+from avn.pipeline.occupancy import LocalPatches, sees_windows, true_windows
+from avn.pipeline.sound_network import SourceEstimates, hears
+from avn.pipeline.sounds import sound_files
+from avn.pipeline.stage import Stage
+from avn.pipeline.stop_classifier import StopProbabilities, can_stop
+from avn.pipeline.views import RenderedViews
+from avn.pipeline.visual_features import VisualEmbeddings
 
-SOUNDS, SIGHTS = ("sound", "reach", "sound_feature"), ("view", "depth", "feature", "window")
+
+@dataclass(frozen=True)
+class Observation:
+    """Something that an agent may observe in each state.
+
+    Attributes
+    ----------
+    audio : bool
+        Whether it is of clips, (K, S, sounds, takes, ...), or of states, (S, ...).
+    stage : callable
+        Config, apartments and clips to the stage that makes it.
+    load : callable
+        That stage to a tensor for each apartment.
+    there : callable
+        Whether a config has what makes it.
+    truth : str, optional
+        The part of `agent.truth` that stands in for it.
+    true : callable, optional
+        Apartments and their scenes to the true tensors.
+    settings : tuple of str
+        Keys of the config that shape it beyond its stage.
+    true_settings : tuple of str
+        Keys of the config that shape the truth.
+    """
+
+    audio: bool
+    stage: Callable[[DictConfig, Apartments, Clips], Any]
+    load: Callable[[Any], list[Tensor]]
+    there: Callable[[DictConfig], bool] = lambda cfg: True
+    truth: str | None = None
+    true: Callable[[Apartments, Sequence[Scene]], list[Tensor]] | None = None
+    settings: tuple[str, ...] = ()
+    true_settings: tuple[str, ...] = ()
 
 
-def heard(
-    cfg: DictConfig, rooms: Sequence[Scene], wanted: Sequence[str]
-) -> list[dict[str, Tensor]]:
-    """What is heard in each room, by the name of the observation.
+def _true_estimates(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
+    sounds = len(sound_files(apartments.cfg, apartments.world))
+    takes = apartments.cfg.takes
+    return [
+        where_sources_are(scene)[0][:, :, None, None].expand(-1, -1, sounds, takes, -1)
+        for scene in scenes
+    ]
+
+
+def _true_patches(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
+    camera = typed(apartments.cfg.renderer.camera)
+    both = [true_windows(plan, camera) for plan in apartments.plans]
+    return [torch.where(visible, free.float(), torch.nan) for free, visible in both]
+
+
+OBSERVATIONS = {
+    "sound": Observation(
+        audio=True,
+        stage=SourceEstimates,
+        load=SourceEstimates.load,
+        there=hears,
+        truth="location",
+        true=_true_estimates,
+        true_settings=("takes",),
+    ),
+    "reach": Observation(
+        audio=True,
+        stage=StopProbabilities,
+        load=StopProbabilities.load,
+        there=can_stop,
+    ),
+    "sound_feature": Observation(
+        audio=True,
+        stage=AudioEmbeddings,
+        load=AudioEmbeddings.load,
+        there=hears,
+    ),
+    "view": Observation(
+        audio=False,
+        stage=lambda cfg, apartments, clips: RenderedViews(cfg, apartments),
+        load=lambda stage: [
+            torch.from_numpy(views.rgb[:]).permute(0, 3, 1, 2) for views in stage.load()
+        ],
+    ),
+    "depth": Observation(
+        audio=False,
+        stage=lambda cfg, apartments, clips: RenderedViews(cfg, apartments),
+        load=lambda stage: [torch.from_numpy(views.depth[:]) for views in stage.load()],
+    ),
+    "feature": Observation(
+        audio=False,
+        stage=lambda cfg, apartments, clips: VisualEmbeddings(cfg, apartments),
+        load=VisualEmbeddings.load,
+    ),
+    "window": Observation(
+        audio=False,
+        stage=lambda cfg, apartments, clips: LocalPatches(cfg, apartments),
+        load=LocalPatches.trusted,
+        there=sees_windows,
+        truth="window",
+        true=_true_patches,
+        settings=("mapper.visible_above",),
+        true_settings=("renderer.camera",),
+    ),
+}
+
+
+class Observed:
+    """Observations in the apartments of one part of a world.
 
     Parameters
     ----------
-    wanted : sequence of str
-        Observations that the agent needs; those that are not heard are left out, and so is what
-        the config has no network for.
-
-    Returns
-    -------
-    list of dict of (K, S, sounds, takes, ...) tensor
+    apartments : Apartments
+    names : sequence of str
+        Keys of `OBSERVATIONS`; others are left out, for an agent has them without any stage.
+    clips : Clips, optional
+        Which clips are heard; those of an evaluation by default.
+    truth : sequence of str
+        Parts in whose place the truth is shown.
     """
-    found: list[dict[str, Tensor]] = [{} for _ in rooms]
-    if not set(wanted) & set(SOUNDS):
-        return found
-    if "sound" in wanted and "location" in cfg.agent.truth:
-        for room, own in zip(rooms, found, strict=True):
-            where = where_sources_are(room)[0][:, :, None, None]
-            own["sound"] = where.expand(-1, -1, len(cfg.sound), cfg.takes, -1)
-    elif "sound" in wanted and sound_network.hears(cfg):
-        scenes.scenes(cfg, (cfg.part,), audible=True)
-        for own, estimates in zip(found, sound_network.hearing(cfg, rooms), strict=True):
-            own["sound"] = estimates
-    if "sound_feature" in wanted and sound_network.hears(cfg):
-        scenes.scenes(cfg, (cfg.part,), audible=True)
-        features = audio_features.sound_features(cfg, rooms, audio_features.evaluated_clips(cfg))
-        for own, found_here in zip(found, features, strict=True):
-            own["sound_feature"] = found_here
-    if "reach" in wanted and stop_classifier.can_stop(cfg):
-        scenes.scenes(cfg, (cfg.part,), audible=True)
-        for own, scores in zip(found, stop_classifier.stop_scores(cfg, rooms), strict=True):
-            own["reach"] = scores
-    return found
 
+    def __init__(
+        self,
+        apartments: Apartments,
+        names: Iterable[str],
+        clips: Clips | None = None,
+        truth: Sequence[str] = (),
+    ) -> None:
+        self.apartments, self.cfg = apartments, apartments.cfg
+        self.names = [name for name in OBSERVATIONS if name in set(names)]
+        self.clips, self._truth = clips or Clips(), truth
 
-def seen(cfg: DictConfig, rooms: Sequence[Scene], wanted: Sequence[str]) -> list[dict[str, Tensor]]:
-    """What is seen in each room, by the name of the observation; as `heard`.
+    def is_true(self, name: str) -> bool:
+        """Whether an observation is the truth."""
+        return OBSERVATIONS[name].truth in self._truth
 
-    Returns
-    -------
-    list of dict of (S, ...) tensor
-    """
-    found: list[dict[str, Tensor]] = [{} for _ in rooms]
-    if "window" in wanted and "window" in cfg.agent.truth:
-        for room, own in zip(rooms, found, strict=True):
-            free, seen_there = occupancy.true_windows(cfg, room)
-            own["window"] = torch.where(seen_there, free.float(), torch.nan)
-    elif "window" in wanted and occupancy.sees_windows(cfg):
-        for own, said in zip(found, occupancy.trusted_windows(cfg, rooms), strict=True):
-            own["window"] = said
-    if "feature" in wanted:
-        for own, features in zip(
-            found, visual_features.features(cfg, (cfg.part,))[cfg.part], strict=True
-        ):
-            own["feature"] = features
-    if {"view", "depth"} & set(wanted):
-        scenes.seen_scenes(cfg, (cfg.part,))
-        hashes = scenes.views_hashes(cfg, (cfg.part,))[cfg.part]
-        for room, own, made_from in zip(rooms, found, hashes, strict=True):
-            views = room.views(cfg.renderer.name, made_from)
-            if "view" in wanted:
-                own["view"] = torch.from_numpy(views.rgb[:]).permute(0, 3, 1, 2)
-            if "depth" in wanted:
-                own["depth"] = torch.from_numpy(views.depth[:])
-    return found
+    def check(self, agent: str) -> None:
+        """Raise `UserError` where the config has nothing that makes an observation."""
+        for name in self.names:
+            if not self.is_true(name) and not OBSERVATIONS[name].there(self.cfg):
+                raise missing_observation(agent, name)
 
+    @property
+    def stages(self) -> dict[str, Stage]:
+        """The stage of each observation that is not the truth and that the config can make."""
+        return {
+            name: OBSERVATIONS[name].stage(self.cfg, self.apartments, self.clips)
+            for name in self.names
+            if not self.is_true(name) and OBSERVATIONS[name].there(self.cfg)
+        }
 
-def senses_hash(cfg: DictConfig, wanted: Sequence[str]) -> list[Any]:
-    """What the observations of an agent depend on beside the apartments, for the run's hash."""
-    parts: list[Any] = []
-    if "sound" in wanted and sound_network.hears(cfg) and "location" not in cfg.agent.truth:
-        parts.append(sound_network.hear_hash(cfg))
-    if "sound_feature" in wanted and sound_network.hears(cfg):
-        parts.append(audio_features.features_hash(cfg, audio_features.evaluated_clips(cfg)))
-    if "reach" in wanted and stop_classifier.can_stop(cfg):
-        parts += [
-            stop_classifier.stop_hash(cfg),
-            cfg.stop_model.criterion,
-            cfg.stop_model.threshold,
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Keys of the config that shape the observations beyond their stages."""
+        keys = [
+            own.true_settings if self.is_true(name) else own.settings
+            for name in self.names
+            for own in (OBSERVATIONS[name],)
         ]
-    if set(wanted) & set(SIGHTS):
-        views = scenes.views_hashes(cfg, (cfg.part,))[cfg.part]
-        if "feature" in wanted:
-            parts.append([visual_features.features_hash(cfg, own) for own in views])
-        if {"view", "depth"} & set(wanted):
-            parts.append(views)
-        if "window" in wanted:
-            true = "window" in cfg.agent.truth
-            parts.append(cfg.renderer.camera if true else _window_hash(cfg, views))
-    return parts
+        return tuple(dict.fromkeys(key for own in keys for key in own))
 
+    def load(self, scenes: Sequence[Scene]) -> tuple[list[Any], list[Any]]:
+        """Read all observations.
 
-def _window_hash(cfg: DictConfig, views: list[str]) -> Any:
-    if not occupancy.sees_windows(cfg):
-        return None
-    return [occupancy.see_hash(cfg), cfg.mapper.visible_above, views]
+        Parameters
+        ----------
+        scenes : sequence of Scene
+            Of the apartments.
+
+        Returns
+        -------
+        heard, seen : lists of dicts of str to tensor
+            For each apartment, by name.
+        """
+        heard: list[dict[str, Tensor]] = [{} for _ in scenes]
+        seen: list[dict[str, Tensor]] = [{} for _ in scenes]
+        stages = self.stages
+        for name in self.names:
+            own = OBSERVATIONS[name]
+            if self.is_true(name) and own.true:
+                tensors = own.true(self.apartments, scenes)
+            else:
+                tensors = own.load(stages[name])
+            for room, tensor in zip(heard if own.audio else seen, tensors, strict=True):
+                room[name] = tensor
+        return heard, seen

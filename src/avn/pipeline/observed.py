@@ -9,12 +9,16 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from avn.acoustics.clips import CLIP_SAMPLES, FADE_SAMPLES, ClipRenderer, DrySounds, brir_spectra
-from avn.acoustics.dry_sounds import load_sounds
-from avn.dataset.scene import Scene
+from avn.acoustics.clips import CLIP_SAMPLES, FADE_SAMPLES, ClipRenderer, brir_spectra
+from avn.core.settings import typed
 from avn.navigation.trace import Trace
-from avn.pipeline import audio_inference, scenes
+from avn.pipeline.apartments import Apartments
+from avn.pipeline.audio_inference import HEARING_SEED
 from avn.pipeline.replay import Run
+from avn.pipeline.scenes import DirectSound
+from avn.pipeline.sounds import dry_sounds
+from avn.pipeline.stage import build
+from avn.pipeline.views import RenderedViews
 
 # Clips rendered at once.
 _BATCH = 64
@@ -33,20 +37,14 @@ class Perceived:
 
     def __init__(self, run: Run) -> None:
         cfg = run.cfg
-        self._regime = str(cfg.acoustics.name)
-        scenes.scenes(cfg, (cfg.part,), audible=True)
-        seen = scenes.seen_scenes(cfg, (cfg.part,))[cfg.part]
-        hashes = scenes.views_hashes(cfg, (cfg.part,))[cfg.part]
-        self._scenes: dict[str, Scene] = {room.name: room for room in seen}
-        self._views = {
-            room.name: room.views(cfg.renderer.name, made_from).rgb
-            for room, made_from in zip(seen, hashes, strict=True)
-        }
-        sounds = DrySounds(load_sounds(audio_inference.sound_files(cfg)))
-        # the clips of `avn.pipeline.sound_network.hearing`: same microphone, seed and purpose
-        self._renderer = ClipRenderer(
-            sounds, scenes.typed(cfg.microphone), audio_inference.HEARING_SEED, "eval"
-        )
+        apartments = Apartments(cfg, cfg.part)
+        sound, rendered = DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
+        build(sound)
+        build(rendered)
+        self._scenes = {scene.name: scene for scene in sound.load()}
+        self._views = dict(zip(self._scenes, (own.rgb for own in rendered.load()), strict=True))
+        # the clips of `SourceEstimates`: same microphone, seed and purpose
+        self._renderer = ClipRenderer(dry_sounds(cfg), typed(cfg.microphone), HEARING_SEED, "eval")
 
     def views(self, room: str, states: Sequence[int] | NDArray[np.int64]) -> NDArray[np.uint8]:
         """First-person views of some states of a room, (N, H, W, 3) uint8."""
@@ -54,7 +52,7 @@ class Perceived:
 
     def clips(self, trace: Trace) -> Tensor:
         """What is heard at each step, (T + 1, 2, 16000) float32, left and right ear."""
-        brirs = self._scenes[trace.place.name].brirs(self._regime)
+        brirs = self._scenes[trace.place.name].brirs
         state, take = torch.from_numpy(trace.state), torch.from_numpy(trace.take)
         parts = []
         for states, takes in zip(state.split(_BATCH), take.split(_BATCH), strict=True):

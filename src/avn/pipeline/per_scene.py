@@ -1,111 +1,66 @@
-"""What a network makes of each apartment, as a stage with one file for each of them."""
+"""What a network makes of apartments, as a stage with a tensor for each of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from abc import abstractmethod
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 import torch
-from omegaconf import DictConfig
 from torch import Tensor
 
-from avn.core.files import stage_folder
-from avn.core.hashing import digest
+from avn.apartments.floor_plan import FloorPlan
 from avn.dataset import scene_file
-from avn.dataset.scene import Scene
-from avn.pipeline.stage import make_once
+from avn.pipeline.apartments import PerApartment
+
+_DATASET = "values"
+# Raised when the layout of the files changes.
+_FORMAT = 1
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What a network makes of apartments: a stage with one file for each.
+class ApartmentTensors(PerApartment):
+    """A tensor for each apartment, in `outputs/<kind>/<apartment>-<hash8>.h5`."""
 
-    Attributes
-    ----------
-    stage : str
-        Its folder under `outputs`.
-    what : str
-        Name of the folder in it.
-    kind, dataset, version : str, str, int
-        Of the files.
-    made_from : str
-        Hash of everything that it depends on beside the apartment.
-    title : str
-        What it is, for the line that says that it is missing.
-    seconds : float
-        How long it takes on two cores, roughly.
-    """
+    @abstractmethod
+    def opened(self) -> Callable[[int], Tensor]:
+        """Open what is needed once, and give what makes the tensor of an apartment by number."""
 
-    stage: str
-    what: str
-    kind: str
-    dataset: str
-    version: int
-    made_from: str
-    title: str
-    seconds: float
+    @property
+    def folder(self) -> Path:
+        """Where the files lie."""
+        return Path(self.cfg.outputs) / self.kind
 
-    def of(
-        self,
-        cfg: DictConfig,
-        chosen: Sequence[Scene],
-        apartments: Sequence[str],
-        make: Callable[[Scene], Tensor],
-    ) -> list[Tensor]:
-        """What the network makes of each apartment, made where it is missing.
+    def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
+        """The file of an apartment."""
+        return self.folder / f"{plan.name}-{fingerprint[:8]}.h5"
 
-        Parameters
-        ----------
-        chosen : sequence of Scene
-        apartments : sequence of str
-            Hash of what it depends on of each of them.
-        make : callable
-            Applies the network to one.
+    def make(self) -> None:
+        """Make the tensors that are missing."""
+        tensor_of = self.opened()
+        for index in self.missing():
+            self.keep(index, tensor_of(index))
+
+    def keep(self, index: int, found: Tensor) -> None:
+        """Write the tensor of an apartment, unless its file is there."""
+
+        def fill(file: h5py.File) -> None:
+            file[_DATASET] = found.numpy()
+
+        path = self.paths[index]
+        if not path.is_file():
+            scene_file.write(path, self.kind, _FORMAT, self.fingerprints[index], fill)
+
+    def load(self) -> list[Tensor]:
+        """The tensor of each apartment.
 
         Raises
         ------
         UserError
-            Where a file is damaged, or it is missing and `auto` is false.
+            Where a file is missing or damaged.
         """
-        folder = stage_folder(cfg.outputs, self.stage, self.what, self.made_from)
-        hashes = [digest(self.made_from, own) for own in apartments]
-        pairs = zip(chosen, hashes, strict=True)
-        paths = [self._path(cfg, scene, own) for scene, own in pairs]
+        return [self._read(*file) for file in zip(self.paths, self.fingerprints, strict=True)]
 
-        def make_missing() -> None:
-            for scene, path, own in zip(chosen, paths, hashes, strict=True):
-                if not path.is_file():
-                    self._write(path, own, make(scene))
-
-        make_once(
-            folder,
-            f"{self.title} in {', '.join(scene.name for scene in chosen)}",
-            done=lambda: all(path.is_file() for path in paths),
-            make=make_missing,
-            auto=cfg.auto,
-            seconds=self.seconds,
-        )
-        return [self._read(path, own) for path, own in zip(paths, hashes, strict=True)]
-
-    def put(self, cfg: DictConfig, scene: Scene, apartment: str, found: Tensor) -> None:
-        """Keep what was found for an apartment on the way to something else, unless it is there."""
-        own = digest(self.made_from, apartment)
-        path = self._path(cfg, scene, own)
-        if not path.is_file():
-            self._write(path, own, found)
-
-    def _path(self, cfg: DictConfig, scene: Scene, made_from: str) -> Path:
-        folder = stage_folder(cfg.outputs, self.stage, self.what, self.made_from)
-        return folder / f"{scene.name}-{made_from[:8]}.h5"
-
-    def _write(self, path: Path, made_from: str, found: Tensor) -> None:
-        def fill(file: h5py.File) -> None:
-            file[self.dataset] = found.numpy()
-
-        scene_file.write(path, self.kind, self.version, made_from, fill)
-
-    def _read(self, path: Path, made_from: str) -> Tensor:
-        with scene_file.open_checked(path, self.kind, self.version, made_from) as file:
-            return torch.from_numpy(file[self.dataset][()])
+    def _read(self, path: Path, fingerprint: str) -> Tensor:
+        with scene_file.open_checked(path, self.kind, _FORMAT, fingerprint) as file:
+            return torch.from_numpy(file[_DATASET][()])

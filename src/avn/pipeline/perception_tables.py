@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 from omegaconf import DictConfig
 from torch import Tensor
 
+from avn.core.settings import typed
 from avn.dataset.scene import Scene
 from avn.mapping.place_errors import place_errors
-from avn.pipeline import audio_inference, occupancy
 from avn.pipeline.audio_inference import sound_errors
+from avn.pipeline.observations import Observed
+from avn.pipeline.occupancy import OccupancyNetwork, window_errors
+from avn.pipeline.sounds import sound_files
 from avn.reporting import perception_tables, results
 from avn.reporting.table import wide_console
 
@@ -28,7 +31,7 @@ TABLES = {
 
 
 def write(
-    cfg: DictConfig,
+    observed: Observed,
     rooms: Sequence[Scene],
     walks: Sequence[NDArray[np.int64]],
     hearing: Sequence[Mapping[str, Tensor]],
@@ -39,18 +42,24 @@ def write(
 
     Parameters
     ----------
+    observed : Observed
+        What the agent observes.
+    rooms : sequence of Scene
     walks : sequence of (W, T) int64
         Exploration walks in each room, as states.
     hearing, sights : sequences of mappings of str to tensor
         What is heard and seen in each room; see `avn.pipeline.observations`.
     """
-    if hearing and "sound" in hearing[0] and "location" not in cfg.agent.truth:
+    cfg, stages = observed.cfg, observed.stages
+    if "sound" in stages:
         heard = [own["sound"] for own in hearing]
         results.write_csv(_heard(cfg, rooms, heard), folder / HEARD)
-    if sights and "window" in sights[0] and "window" not in cfg.agent.truth:
-        seen = occupancy.window_errors(cfg, rooms, occupancy.windows(cfg, rooms))
+    if "window" in stages:
+        estimates = [own[:, 0] for own in stages["window"].load()]
+        prior = OccupancyNetwork(cfg).prior()
+        seen = window_errors(rooms, typed(cfg.renderer.camera), estimates, prior)
         results.write_csv(seen, folder / SEEN)
-    if sights and "feature" in sights[0] and "top" in cfg.mapper:
+    if "feature" in stages and "top" in cfg.mapper:
         features = [own["feature"] for own in sights]
         results.write_csv(_places(cfg, rooms, walks, features), folder / PLACES)
 
@@ -65,7 +74,7 @@ def show(folder: Path) -> None:
 
 
 def _heard(cfg: DictConfig, rooms: Sequence[Scene], heard: Sequence[Tensor]) -> pd.DataFrame:
-    names = tuple(audio_inference.sound_files(cfg))
+    names = tuple(sound_files(cfg))
     errors = [sound_errors(room, own, names) for room, own in zip(rooms, heard, strict=True)]
     return pd.concat(errors, ignore_index=True).assign(acoustics=cfg.acoustics.name)
 

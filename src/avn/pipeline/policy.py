@@ -1,12 +1,10 @@
-"""The actor-critic agents of a config, trained where they are missing."""
+"""Actor-critic agents: their networks, trained where agents act, as a stage."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -18,36 +16,28 @@ from torch import Tensor
 from avn.agents.actor_critic import ActorCriticAgent, ActorCriticConfig
 from avn.agents.rollout import Labels, walk_room
 from avn.core.errors import UserError
-from avn.core.files import check_name, stage_folder, written_whole
-from avn.core.hashing import digest, file_hash
-from avn.dataset import build
+from avn.core.files import check_name
+from avn.core.settings import plain, typed
 from avn.dataset.scene import Scene
 from avn.navigation.episodes import frozen_episodes
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
-from avn.navigation.starts import build_starts
 from avn.navigation.tables import Tables, build_tables
-from avn.navigation.world import World
-from avn.pipeline import (
-    audio_features,
-    audio_inference,
-    occupancy,
-    scenes,
-    sound_network,
-    visual_features,
-)
-from avn.pipeline.audio_features import Clips
-from avn.pipeline.stage import make_once
-from avn.pipeline.trained import CHECKSUM, METRICS, apartments, read_metrics
-from avn.reporting.model_card import write_card
+from avn.pipeline.apartments import TRAINING, Apartments
+from avn.pipeline.audio_inference import Clips
+from avn.pipeline.observations import Observed
+from avn.pipeline.occupancy import sees_windows
+from avn.pipeline.scenes import Geometry
+from avn.pipeline.sound_network import hears
+from avn.pipeline.sounds import sound_files
+from avn.pipeline.stage import Stage
+from avn.pipeline.trained import METRICS, Trained
 from avn.rl.a3c import BEST, MONITOR, Training, load_network
-from avn.rl.config import A3CConfig, check_recipe
+from avn.rl.config import check_recipe
 from avn.rl.explorations import draw_walks
 from avn.rl.networks import ActorCritic, Shape
 from avn.rl.worker import Task
 
-# Raised when the code of training changes its result.
-VERSION = 1
 # Draws the episodes on which an agent is measured while it learns.
 MEASURED_SEED = 0
 PARTS = ("train", "validation")
@@ -60,160 +50,144 @@ def learns(cfg: DictConfig) -> bool:
     return OmegaConf.get_type(cfg.baseline) is ActorCriticConfig
 
 
-def policy_hash(cfg: DictConfig) -> str:
-    """Hash of what the weights of the agent depend on."""
-    views = scenes.views_hashes(cfg, PARTS)
-    observed: list[Any] = [[visual_features.features_hash(cfg, v) for v in views[p]] for p in PARTS]
-    if sound_network.hears(cfg):
-        acoustics = scenes.acoustics_of(cfg)
-        plans = scenes.plans(cfg)
-        observed += [build.first_arrival_hash(plan, acoustics) for p in PARTS for plan in plans[p]]
-        observed += [audio_features.features_hash(cfg, clips_of(cfg, part)) for part in PARTS]
-    if occupancy.sees_windows(cfg):
-        observed += [occupancy.see_hash(cfg), cfg.mapper.visible_above, cfg.mapper.size]
-    node: Any = OmegaConf.to_container(cfg.baseline, resolve=True)
-    node.pop("samples")
-    return digest(observed, cfg.protocol, node, cfg.a3c, VERSION)
+def parts(cfg: DictConfig) -> dict[str, Any]:
+    """What an actor-critic is built of beside its own node and its network."""
+    return {"hears": hears(cfg), "maps": sees_windows(cfg), "map_size": cfg.mapper.size}
 
 
-def policy(cfg: DictConfig, asked: bool = False) -> tuple[ActorCritic, Path]:
-    """The trained network of the config's agent and its folder; trains it where it is missing.
+class Policy(Trained):
+    """The network of an actor-critic agent."""
 
-    Parameters
-    ----------
-    asked : bool
-        Whether it is the network that the user asked for, so that `auto=false` does not refuse it.
+    kind = "train/policy"
 
-    Raises
-    ------
-    UserError
-        Where the agent is no actor-critic, a checkpoint belongs to another config, or something is
-        missing and `auto` is false.
-    """
-    if not learns(cfg):
-        raise UserError(f"agent: '{cfg.agent.name}' is no actor-critic; choose model=a3c_va")
-    check_name("agent.name", cfg.agent.name)
-    recipe: A3CConfig = check_recipe(scenes.typed(cfg.a3c))
-    made_from = policy_hash(cfg)
-    folder = stage_folder(cfg.outputs, "train", cfg.agent.name, made_from)
-    make_once(
-        folder,
-        f"agent '{cfg.agent.name}' ({_settings(cfg)})",
-        done=(folder / METRICS).is_file,
-        make=lambda: _train(cfg, recipe, folder, made_from),
-        auto=cfg.auto or asked,
-        seconds=_training_time(cfg),
+    @property
+    def name(self) -> str:
+        """The name of the row, which names the folder."""
+        return str(self.cfg.agent.name)
+
+    def check(self) -> None:
+        """Refuse an agent that does not learn, and recipes that cannot work."""
+        if not learns(self.cfg):
+            raise UserError(
+                f"agent: '{self.cfg.agent.name}' is no actor-critic; choose model=a3c_va"
+            )
+        check_name("agent.name", self.cfg.agent.name)
+        check_recipe(typed(self.cfg.a3c))
+        if self.cfg.baseline.memory and not self.cfg.protocol.exploration:
+            raise UserError("protocol.exploration: 0, and an agent with memory explores; give 400")
+
+    def needs(self) -> Sequence[Any]:
+        """What it observes in the training and in the validation apartments."""
+        return [stage for part in PARTS for stage in part_stages(self.cfg, part)]
+
+    def settings(self) -> Sequence[str]:
+        """Its shape, the recipe, and the rules of the episodes."""
+        maps = ("mapper.size",) if sees_windows(self.cfg) else ()
+        shaped = observed(self.cfg, "train").settings
+        return ("baseline", "a3c", "protocol", *maps, *shaped)
+
+    def ignored(self) -> Sequence[str]:
+        """How it acts once it is trained, and what agents without memory or map have not."""
+        memory, maps = self.cfg.baseline.memory, sees_windows(self.cfg)
+        radius = self.cfg.protocol.goal != "radius"
+        return [
+            "baseline.samples",
+            *(() if memory else ("a3c.walks", "a3c.refresh")),
+            *(() if maps else ("baseline.map_width",)),
+            *(() if memory and maps else ("baseline.top",)),
+            *(("protocol.radius",) if radius else ()),
+            *(() if hears(self.cfg) else ("a3c.takes",)),
+        ]
+
+    def consulted(self) -> Sequence[str]:
+        """The name of the row."""
+        return ("agent.name",)
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        acoustics, seed = self.train.node("acoustics").name, self.cfg.a3c.train_seed
+        settings = f"{acoustics}, {self.cfg.protocol.name}, train_seed {seed}"
+        return f"agent '{self.cfg.agent.name}' ({settings})"
+
+    def seconds(self) -> float:
+        """By the number of actions and what is computed for each."""
+        microseconds = 30 + 30 * sees_windows(self.cfg) + 30 * bool(self.cfg.baseline.memory)
+        return float(self.cfg.a3c.total * microseconds / 1e6 * 1.6)
+
+    def make(self) -> None:
+        """Train it, or go on where a killed training was."""
+        _train(self)
+
+    def load(self) -> ActorCritic:
+        """The trained network, set to evaluation.
+
+        Raises
+        ------
+        UserError
+            Where a checkpoint belongs to another config, or has changed since it was trained.
+        """
+        network = ActorCritic(_shape(self.cfg, self._feature_sizes()))
+        load_network(network, self.folder / BEST, self.fingerprint)
+        self.check_weights()
+        return network.eval()
+
+    def _feature_sizes(self) -> dict[str, int]:
+        sizes = self.metrics().get("features")
+        if not isinstance(sizes, dict):
+            raise UserError(
+                f"{self.folder / METRICS}: damaged; delete {self.folder} to train again"
+            )
+        return {str(name): int(size) for name, size in sizes.items()}
+
+
+def observed(cfg: DictConfig, part: str) -> Observed:
+    """What an actor-critic observes in a part of the training world."""
+    given = parts(cfg)
+    names = ActorCriticAgent(hears=given["hears"], maps=given["maps"]).wants(
+        instantiate(cfg.protocol)
     )
-    network = ActorCritic(_shape(cfg, _feature_sizes(folder)))
-    load_network(network, folder / BEST, made_from)
-    if read_metrics(folder).get(CHECKSUM) != file_hash(folder / BEST):
-        raise UserError(f"{folder / BEST}: changed since it was trained; delete {folder}")
-    return network.eval(), folder
+    clips = Clips("a3c.takes", "train") if part == "train" else Clips()
+    return Observed(Apartments(cfg, part, TRAINING), names, clips)
 
 
-def _settings(cfg: DictConfig) -> str:
-    """What tells networks of one row apart, in words."""
-    return f"{cfg.acoustics.name}, {cfg.protocol.name}, train_seed {cfg.a3c.train_seed}"
+def part_stages(cfg: DictConfig, part: str) -> list[Stage]:
+    """Geometry of a part of the training world, and what makes the observations there."""
+    geometry = Geometry(cfg, Apartments(cfg, part, TRAINING))
+    return [geometry, *observed(cfg, part).stages.values()]
 
 
-def _training_time(cfg: DictConfig) -> float:
-    """Seconds that training takes on two cores, roughly."""
-    microseconds = 30 + 30 * occupancy.sees_windows(cfg) + 30 * bool(cfg.baseline.memory)
-    return float(cfg.a3c.total * microseconds / 1e6 * 1.6)
+def load_part(cfg: DictConfig, part: str) -> tuple[list[Scene], list[Any], list[Any]]:
+    """Scenes of a part of the training world, with what is heard and what is seen in each."""
+    scenes = Geometry(cfg, Apartments(cfg, part, TRAINING)).load()
+    return (scenes, *observed(cfg, part).load(scenes))
 
 
-def parts(cfg: DictConfig, ready: bool) -> dict[str, Any]:
-    """What the agent is built of beside its own node; with `ready`, its trained network."""
-    given = {
-        "hears": sound_network.hears(cfg),
-        "maps": occupancy.sees_windows(cfg),
-        "map_size": cfg.mapper.size,
-    }
-    return given | ({"network": policy(cfg)[0]} if ready else {})
-
-
-def observed_names(cfg: DictConfig) -> tuple[str, ...]:
-    """What the config's agent observes, by the names of `avn.rl.environment.WalkEnv`."""
-    heard = ("sound_feature",) if sound_network.hears(cfg) else ()
-    return ("feature", *heard, *(("map",) if occupancy.sees_windows(cfg) else ()))
-
-
-def open_tables(cfg: DictConfig, part: str) -> tuple[Tables, Protocol, A3CConfig]:
-    """The apartments of a part as tables, with the rules and the recipe.
-
-    Raises
-    ------
-    UserError
-        Where `part` is none of `PARTS`.
-    """
-    if part not in PARTS:
-        raise UserError(f"part: '{part}' is none of {', '.join(PARTS)}")
-    protocol: Protocol = instantiate(cfg.protocol)
-    rooms, hearing, sights = _observed(cfg, part)
-    tables = build_tables(rooms, protocol, hearing, sights, len(audio_inference.TRAINING_SOUNDS))
-    return tables, protocol, check_recipe(scenes.typed(cfg.a3c))
-
-
-def free_world(
-    tables: Tables, protocol: Protocol, recipe: A3CConfig, n: int, max_steps: int | None
-) -> World:
-    """N episodes in the apartments of tables, without exploration."""
-    starts = build_starts(tables)
-    return World(tables, starts, n, protocol, max_steps, recipe.reward, recipe.train_seed)
-
-
-def clips_of(cfg: DictConfig, part: str) -> Clips:
-    """What is heard in the apartments of a part: the built-in sounds, whatever `sound` says."""
-    if part == "train":
-        return Clips(audio_inference.TRAINING_SOUNDS, cfg.a3c.takes, "train")
-    return Clips(audio_inference.TRAINING_SOUNDS, cfg.takes)
+def tables_of(cfg: DictConfig, opened: tuple[list[Scene], list[Any], list[Any]]) -> Tables:
+    """The apartments of `load_part` as tables, under the protocol of the config."""
+    rooms, hearing, sights = opened
+    sounds = len(sound_files(cfg, TRAINING))
+    return build_tables(rooms, instantiate(cfg.protocol), hearing, sights, sounds)
 
 
 def _shape(cfg: DictConfig, features: dict[str, int]) -> Shape:
     protocol: Protocol = instantiate(cfg.protocol)
-    maps = occupancy.sees_windows(cfg)
     return Shape(
         features=features,
         actions=protocol.actions,
         width=cfg.baseline.width,
         memory=cfg.baseline.memory,
-        map_channels=maps * (2 if cfg.baseline.memory else 1),
+        map_channels=sees_windows(cfg) * (2 if cfg.baseline.memory else 1),
         map_width=cfg.baseline.map_width,
     )
 
 
-def _feature_sizes(folder: Path) -> dict[str, int]:
-    """Sizes of the features that a trained agent takes, as its metrics say."""
-    sizes = read_metrics(folder).get("features")
-    if not isinstance(sizes, dict):
-        raise UserError(f"{folder / METRICS}: damaged; delete {folder} to train again")
-    return {str(name): int(size) for name, size in sizes.items()}
-
-
-def _observed(cfg: DictConfig, part: str) -> tuple[list[Scene], list[Any], list[Any]]:
-    """Scenes of a part, with what is heard and what is seen in each."""
-    rooms = scenes.scenes(cfg, (part,), audible=sound_network.hears(cfg))[part]
-    hearing: list[dict[str, Tensor]] = [{} for _ in rooms]
-    sights: list[dict[str, Tensor]] = [{} for _ in rooms]
-    for own, found in zip(sights, visual_features.features(cfg, (part,))[part], strict=True):
-        own["feature"] = found
-    if sound_network.hears(cfg):
-        heard = audio_features.sound_features(cfg, rooms, clips_of(cfg, part))
-        for own, found in zip(hearing, heard, strict=True):
-            own["sound_feature"] = found
-    if occupancy.sees_windows(cfg):
-        for own, found in zip(sights, occupancy.trusted_windows(cfg, rooms), strict=True):
-            own["window"] = found
-    return rooms, hearing, sights
-
-
-def _train(cfg: DictConfig, recipe: A3CConfig, folder: Path, made_from: str) -> None:
+def _train(policy: Policy) -> None:
     """Train, and write what was measured."""
     started = time.perf_counter()
-    protocol: Protocol = instantiate(cfg.protocol)
-    observed = {part: _observed(cfg, part) for part in PARTS}
-    rooms, hearing, sights = observed["train"]
-    tables = build_tables(rooms, protocol, hearing, sights, len(audio_inference.TRAINING_SOUNDS))
+    cfg, recipe = policy.cfg, typed(policy.cfg.a3c)
+    opened = {part: load_part(cfg, part) for part in PARTS}
+    tables = tables_of(cfg, opened["train"])
     features = _sizes(tables)
     shape = _shape(cfg, features)
     torch.manual_seed(recipe.train_seed)
@@ -222,6 +196,7 @@ def _train(cfg: DictConfig, recipe: A3CConfig, folder: Path, made_from: str) -> 
         table = tables.sights.get(name, tables.hearing.get(name))
         assert table is not None
         network.standardise(name, table[:: max(1, len(table) // _EXAMPLES)])
+    protocol: Protocol = instantiate(cfg.protocol)
     task = Task(
         tables=tables,
         protocol=protocol,
@@ -229,22 +204,17 @@ def _train(cfg: DictConfig, recipe: A3CConfig, folder: Path, made_from: str) -> 
         recipe=recipe,
         buffers=dict(network.named_buffers()),
         map_size=cfg.mapper.size,
-        walks=_walks(cfg, rooms, tables),
+        walks=_walks(cfg, opened["train"][0], tables),
         top=cfg.baseline.top,
     )
-    measure = Measure(cfg, observed, protocol)
-    curve = Training(task, network, folder, measure, made_from).run()
+    measure = Measure(cfg, opened, protocol)
+    curve = Training(task, network, policy.folder, measure, policy.fingerprint).run()
     best = max(curve, key=lambda own: own[MONITOR])
     metrics: dict[str, Any] = {f"best/{name}": value for name, value in best.items()}
     metrics |= {f"untrained/{name}": value for name, value in curve[0].items()}
     metrics |= {"features": features, "steps": curve[-1]["steps"]}
-    metrics |= {"seconds": time.perf_counter() - started, CHECKSUM: file_hash(folder / BEST)}
-    with written_whole(folder / METRICS) as part:
-        part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
-    title = f"Actor-critic agent '{cfg.agent.name}' ({_settings(cfg)})"
-    recipe_of = {"baseline": cfg.baseline, "a3c": cfg.a3c, "protocol": cfg.protocol}
-    plain = {name: OmegaConf.to_container(node, resolve=True) for name, node in recipe_of.items()}
-    write_card(folder, title, apartments(cfg), plain, metrics)
+    metrics |= {"seconds": time.perf_counter() - started}
+    policy.finish(metrics, {name: plain(cfg, name) for name in ("baseline", "a3c", "protocol")})
 
 
 def _sizes(tables: Tables) -> dict[str, int]:
@@ -256,11 +226,9 @@ def _sizes(tables: Tables) -> dict[str, int]:
 
 
 def _walks(cfg: DictConfig, rooms: Sequence[Scene], tables: Tables) -> Tensor | None:
-    steps = cfg.protocol.exploration
     if not cfg.baseline.memory:
         return None
-    if not steps:
-        raise UserError("protocol.exploration: 0, and an agent with memory explores; give 400")
+    steps = cfg.protocol.exploration
     return draw_walks([*rooms], tables, cfg.a3c.walks, steps, cfg.a3c.train_seed)
 
 
@@ -277,13 +245,13 @@ class Measure:
     def __init__(self, cfg: DictConfig, observed: dict[str, Any], protocol: Protocol) -> None:
         self._cfg, self._observed = cfg, observed
         self._protocol = dataclasses.replace(protocol, starts=cfg.a3c.validation_starts)
-        self._labels = Labels(agent=cfg.agent.name, acoustics=cfg.acoustics.name)
+        acoustics = OmegaConf.select(cfg, TRAINING.acoustics).name
+        self._labels = Labels(agent=cfg.agent.name, acoustics=acoustics)
 
     def __call__(self, network: ActorCritic) -> dict[str, float]:
         """Return, success rate and SPL, such as `validation/spl`."""
         found = {}
-        given = parts(self._cfg, ready=False)
-        options: Any = OmegaConf.to_container(self._cfg.baseline, resolve=True)
+        given, options = parts(self._cfg), plain(self._cfg, "baseline")
         options.pop("_target_")
         agent = ActorCriticAgent(network, **options, **given)
         for part, (rooms, hearing, sights) in self._observed.items():
@@ -298,5 +266,5 @@ class Measure:
         return found
 
     def _episodes(self, room: Scene) -> Any:
-        sounds = list(audio_inference.TRAINING_SOUNDS)
+        sounds = list(sound_files(self._cfg, TRAINING))
         return frozen_episodes(room, sounds, self._protocol, MEASURED_SEED)

@@ -17,10 +17,11 @@ from omegaconf import DictConfig
 from avn.agents.recorder import Recorder
 from avn.agents.rollout import Watch
 from avn.core.errors import UserError
+from avn.core.settings import plain
 from avn.dataset.scene import Scene
 from avn.navigation.trace import Trace
-from avn.pipeline import observations, scenes
-from avn.pipeline.run import read_run, run_hash, walk_rooms, wanted_by
+from avn.pipeline.run import Evaluation, read_run, walk_rooms
+from avn.pipeline.stage import MACHINE, build
 
 # Settings that a run is named by where it differs in them from the others.
 _TELLING = ("protocol", "acoustics", "look", "localisation", "exploration", "seed", "train_seed")
@@ -47,10 +48,18 @@ class Run:
     _rooms: list[Scene] = field(default_factory=list)
 
     @property
+    def settings(self) -> dict[str, str]:
+        """The settings that the run reads, as dotted keys and texts."""
+        read = sorted(Evaluation(self.cfg).read())
+        return {key: str(plain(self.cfg, key)) for key in read}
+
+    @property
     def rooms(self) -> list[Scene]:
         """The scenes that were walked."""
         if not self._rooms:
-            self._rooms = scenes.scenes(self.cfg, (self.cfg.part,))[self.cfg.part]
+            geometry = Evaluation(self.cfg).geometry
+            build(geometry)
+            self._rooms = geometry.load()
         return self._rooms
 
 
@@ -134,8 +143,9 @@ def episode_keys(episodes: pd.DataFrame) -> list[tuple[Any, ...]]:
 
 def names_of(runs: Sequence[Run]) -> list[str]:
     """Names that tell runs apart: the agent, and those settings in which they differ."""
-    settings = [_flat(run.cfg) for run in runs]
-    keys = [key for key in settings[0] if len({own.get(key) for own in settings}) > 1]
+    settings = [run.settings for run in runs]
+    keys = [key for own in settings for key in own]
+    keys = [key for key in dict.fromkeys(keys) if len(_values(key, settings)) > 1]
     shown = [key for key in keys if key.split(".")[0] in _TELLING]
     names = []
     for run, own in zip(runs, settings, strict=True):
@@ -148,17 +158,13 @@ def names_of(runs: Sequence[Run]) -> list[str]:
 
 def settings_but_seed(run: Run) -> str:
     """All settings of a run that make its records, but for the seed of its episodes."""
-    machine = ("seed", "outputs", "processes", "auto", "film", "film_show")
-    own = _flat(run.cfg)
-    return repr(sorted((key, value) for key, value in own.items() if key not in machine))
+    others = ("seed", *MACHINE, "film", "film_show")
+    return repr([(key, value) for key, value in run.settings.items() if key not in others])
 
 
-def _flat(node: Any, path: str = "") -> dict[str, str]:
-    """A config as dotted keys and texts."""
-    if isinstance(node, DictConfig):
-        parts = (_flat(node[key], f"{path}.{key}" if path else key) for key in map(str, node))
-        return {key: value for part in parts for key, value in part.items()}
-    return {path: str(node)}
+def _values(key: str, settings: Sequence[Mapping[str, str]]) -> set[str]:
+    """What runs that read a setting have for it."""
+    return {own[key] for own in settings if key in own}
 
 
 def traces(run: Run, labels: Sequence[int], thoughts: bool = True) -> list[Trace]:
@@ -198,7 +204,7 @@ def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[l
 
     # a run of another version must not set off the training of this version's networks
     cfg = run.cfg.copy()
-    own = run.folder.resolve().name.endswith(run_hash(cfg)[:8])
+    own = run.folder.resolve().name.endswith(Evaluation(cfg).fingerprint[:8])
     cfg.auto = cfg.auto and own
     try:
         walked = _walk(cfg, run.rooms, kept, watch)
@@ -222,11 +228,10 @@ def _walk(
     cfg: DictConfig, rooms: Sequence[Scene], kept: Sequence[int], watch: Watch
 ) -> list[pd.DataFrame]:
     """Walk some of the rooms of a config, by number."""
-    observed = wanted_by(cfg)
-    hearing, sights = (
-        observations.heard(cfg, rooms, observed),
-        observations.seen(cfg, rooms, observed),
-    )
+    evaluation = Evaluation(cfg)
+    for need in evaluation.needs():
+        build(need)
+    hearing, sights = evaluation.observed.load(rooms)
     return walk_rooms(
         cfg,
         [rooms[i] for i in kept],

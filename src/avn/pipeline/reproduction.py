@@ -14,10 +14,10 @@ from avn.core.errors import UserError
 from avn.core.files import stage_folder, written_whole
 from avn.core.hashing import digest
 from avn.core.progress import span, tell
-from avn.pipeline import audio_inference, plan, policy, sound_network
 from avn.pipeline.dashboard import Dashboard
-from avn.pipeline.run import RESULTS, agent_label, read_run
-from avn.pipeline.stage import refusal, spent
+from avn.pipeline.run import RESULTS, Evaluation, agent_label, read_run
+from avn.pipeline.sounds import sound_files
+from avn.pipeline.stage import make, missing, refusal, spent
 from avn.reporting import published, results, table
 from avn.reporting.table import PAPER_PROTOCOL
 
@@ -63,39 +63,60 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig]) -> Path:
     for shown in (published.terminal(cells, privileged), table.hardness_table(episodes[0])):
         table.wide_console().print(shown)
     target = stage_folder(cfg.outputs, "reproduce", "table", digest([f.name for f in folders]))
-    _write(target, runs, cells, list(audio_inference.sound_files(configs[0])), privileged)
+    _write(target, runs, cells, list(sound_files(configs[0])), privileged)
     _compare(walked)
     return target
 
 
+def settings_of(rows: Sequence[DictConfig]) -> set[str]:
+    """Leaf keys of the config that at least one row reads, and those of the command itself."""
+    own = {"rows", "sounds", "seeds", "train_seeds"}
+    return own.union(*(Evaluation(row).read() for row in rows))
+
+
 def _walk(configs: Sequence[DictConfig]) -> list[Path]:
     """Make what is missing and let all runs walk; tell the plan before, and each row at its end."""
-    steps = plan.steps(configs)
-    missing = [step for step in steps if step.stage.missing]
-    for step in missing:
-        if step.run is None and not configs[0].auto:
-            raise refusal(step.stage.folder, step.stage.what)
-        tell(f"to make: {step.stage.what} (about {span(step.stage.seconds)})")
-    if missing:
-        tell(f"all in all about {span(sum(step.stage.seconds for step in missing))}")
-    left = [step.run.agent.name for step in steps if step.run is not None]
-    walked: dict[str, list[Path]] = {row: [] for row in left}
+    runs = [Evaluation(cfg) for cfg in configs]
+    for run in runs:
+        run.check()
+    steps = missing(runs)
+    for stage in steps:
+        if not (stage.cfg.auto or isinstance(stage, Evaluation)):
+            raise refusal(stage)
+        tell(f"to make: {stage.title} (about {span(stage.seconds())})")
+    if steps:
+        tell(f"all in all about {span(sum(stage.seconds() for stage in steps))}")
     paper = published.paper_averages() if configs[0].protocol.name == PAPER_PROTOCOL else {}
-    started = time.monotonic()
-    with Dashboard([step.stage for step in missing], list(walked), paper) as board:
-        for step in steps:
-            if step.stage.missing:
-                step.make()
-                board.made()
-            if step.run is None:
-                continue
-            row = left.pop(0)
-            walked[row].append(step.stage.folder)
-            board.fill(row, _average(walked[row]))
-            if row not in left:
-                passed = span(time.monotonic() - started)
-                tell(f"{row}: {_average(walked[row])} after {passed}")
-    return [folder for own in walked.values() for folder in own]
+    rows = dict.fromkeys(cfg.agent.name for cfg in configs)
+    with Dashboard([(s.title, s.seconds()) for s in steps], list(rows), paper) as board:
+        table = _Rows(runs, board)
+        table.fill()
+        for stage in steps:
+            make(stage, asked=isinstance(stage, Evaluation))
+            board.made()
+            table.fill()
+    return [run.folder for run in runs]
+
+
+class _Rows:
+    """The rows of the table, which are filled in their order as their runs come to an end."""
+
+    def __init__(self, runs: Sequence[Evaluation], board: Dashboard) -> None:
+        self._left, self._board = list(runs), board
+        self._walked: dict[str, list[Path]] = {}
+        self._started = time.monotonic()
+
+    def fill(self) -> None:
+        """Take in the next runs, as far as they are there."""
+        while self._left and self._left[0].done():
+            run = self._left.pop(0)
+            row = str(run.cfg.agent.name)
+            folders = self._walked.setdefault(row, [])
+            folders.append(run.folder)
+            self._board.fill(row, _average(folders))
+            if row not in [own.cfg.agent.name for own in self._left]:
+                passed = span(time.monotonic() - self._started)
+                tell(f"{row}: {_average(folders)} after {passed}")
 
 
 def _average(folders: Sequence[Path]) -> str:
@@ -109,11 +130,12 @@ def _average(folders: Sequence[Path]) -> str:
 
 def _runs(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:
     """The configs of a row: each seed, and each network where something in it is trained."""
-    trained = sound_network.hears(composed) or policy.learns(composed)
-    runs = []
     networks = list(dict.fromkeys(cfg.train_seeds))
+    if "train_seed" not in Evaluation(composed).read():
+        networks = [composed.train_seed]
+    runs = []
     for seed in dict.fromkeys(cfg.seeds):
-        for train_seed in networks if trained else networks[:1]:
+        for train_seed in networks:
             own = copy.deepcopy(composed)  # composing takes Hydra a while
             own.seed, own.train_seed = seed, train_seed
             runs.append(own)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from hydra.utils import instantiate
@@ -11,41 +12,27 @@ from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
-from avn.acoustics.dry_sounds import content_hash, load_sounds
 from avn.agents.rollout import Labels, Watch, walk_room
+from avn.apartments.splits import PARTS
 from avn.core.errors import UserError
 from avn.core.files import check_name, written_whole
-from avn.core.hashing import digest
-from avn.dataset import build
 from avn.dataset.scene import Scene
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
 from avn.navigation.exploration import EXPLORATIONS
 from avn.navigation.protocols import Protocol
-from avn.pipeline import (
-    audio_inference,
-    observations,
-    perception_tables,
-    policy,
-    scenes,
-)
-from avn.pipeline.agent import acting, build_agent
-from avn.pipeline.stage import make_once
+from avn.pipeline import perception_tables
+from avn.pipeline.agent import agent_ignored, agent_settings, agent_stages, build_agent
+from avn.pipeline.apartments import Apartments
+from avn.pipeline.observations import Observed
+from avn.pipeline.occupancy import OccupancyNetwork
+from avn.pipeline.policy import learns
+from avn.pipeline.scenes import Geometry
+from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
+from avn.pipeline.stage import Stage
 from avn.reporting import results, table
 
-# Raised when the code of simulator, agents or metrics changes a record.
-VERSION = 3
 RESULTS, EPISODE_RECORDS = "results.csv", "episodes.csv"
 EPISODES = ("frozen", "exhaustive")
-
-
-def run_hash(cfg: DictConfig) -> str:
-    """Hash of what a run's records depend on."""
-    acoustics = scenes.acoustics_of(cfg)
-    apartments = [build.first_arrival_hash(p, acoustics) for p in scenes.plans(cfg)[cfg.part]]
-    observed = observations.senses_hash(cfg, wanted_by(cfg))
-    rules = (cfg.protocol, cfg.agent, cfg.seed, cfg.episodes, cfg.exploration)
-    sounds = list(content_hash(audio_inference.sound_files(cfg)).items())
-    return digest(apartments, observed, rules, acting(cfg), sounds, VERSION)
 
 
 def wanted_by(cfg: DictConfig) -> tuple[str, ...]:
@@ -58,72 +45,125 @@ def agent_label(cfg: DictConfig) -> str:
     return "-true-".join((cfg.agent.name, *cfg.agent.truth))
 
 
-def run_folder_name(cfg: DictConfig) -> str:
-    """`<agent>/<sounds>/seed<seed>-<hash8>`: the folder of a run under `outputs/eval`."""
-    sounds = "-".join(audio_inference.sound_files(cfg))
-    check_name("agent.name", cfg.agent.name)
-    return f"{cfg.agent.name}/{sounds}/seed{cfg.seed}-{run_hash(cfg)[:8]}"
+class Evaluation(Stage):
+    """A run: the records of an agent over all episodes of a part of the test world."""
 
+    kind = "eval"
+    # Raised when the code of simulator, agents or metrics changes a record.
+    version = 4
 
-def evaluate(cfg: DictConfig) -> Path:
-    """Walk, unless the run is there, and write `episodes.csv`, `results.csv` and TensorBoard.
+    @property
+    def apartments(self) -> Apartments:
+        """The apartments in which it walks."""
+        return Apartments(self.cfg, self.cfg.part)
 
-    Returns
-    -------
-    Path
-        The run's folder.
+    @property
+    def geometry(self) -> Geometry:
+        """Their geometry."""
+        return Geometry(self.cfg, self.apartments)
 
-    Raises
-    ------
-    UserError
-        Where an option cannot work, or something it needs is missing and `auto` is false.
-    """
-    if not 0 <= cfg.seed < 2**62:
-        raise UserError(f"seed: {cfg.seed} is out of range; give 0 or more")
-    if cfg.episodes not in EPISODES:
-        raise UserError(f"episodes: '{cfg.episodes}' is none of {', '.join(EPISODES)}")
-    if cfg.part not in scenes.PARTS:
-        raise UserError(f"part: '{cfg.part}' is none of {', '.join(scenes.PARTS)}")
-    if cfg.exploration not in EXPLORATIONS:
-        raise UserError(f"exploration: '{cfg.exploration}' is none of {', '.join(EXPLORATIONS)}")
-    instantiate(cfg.protocol)  # rules that contradict themselves are refused first
-    agent = build_agent(cfg)
-    if agent.privileged != cfg.agent.privileged:
-        raise UserError(
-            f"agent.privileged: {cfg.agent.privileged}, but '{type(agent).__name__}' is "
-            f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
+    @property
+    def observed(self) -> Observed:
+        """What its agent observes there."""
+        return Observed(self.apartments, wanted_by(self.cfg), truth=self.cfg.agent.truth)
+
+    def needs(self) -> Sequence[Stage]:
+        """Geometry, what makes the observations, and the networks of the agent."""
+        stages = self.observed.stages
+        # its prior stands beside what it says of free cells
+        prior = [OccupancyNetwork(self.cfg)] if "window" in stages else []
+        return (self.geometry, *stages.values(), *agent_stages(self.cfg), *prior)
+
+    def settings(self) -> Sequence[str]:
+        """The rules, the episodes, and the agent."""
+        explores = ("exploration",) if self._walks_first else ()
+        return (
+            "protocol",
+            "agent",
+            "seed",
+            "episodes",
+            *explores,
+            # a column of the records, also for agents that do not hear
+            "acoustics.name",
+            *agent_settings(self.cfg),
+            *self.observed.settings,
         )
-    load_sounds(audio_inference.sound_files(cfg))  # a bad file is refused before anything is made
-    folder = Path(cfg.outputs) / "eval" / run_folder_name(cfg)
-    make_once(
-        folder,
-        f"run of '{cfg.agent.name}' (seed {cfg.seed}, train_seed {cfg.train_seed})",
-        done=(folder / RESULTS).is_file,
-        make=lambda: _walk(cfg, folder),
-        seconds=_walking_time(cfg),
-    )
-    return folder
 
+    def ignored(self) -> Sequence[str]:
+        """What makes no difference to this agent under these rules."""
+        radius = () if self.cfg.protocol.goal == "radius" else ("protocol.radius",)
+        return (*agent_ignored(self.cfg), *radius)
 
-def _walking_time(cfg: DictConfig) -> float:
-    """Seconds that a run takes on two cores, roughly, once all that it needs is there."""
-    return 15.0 if cfg.planner._target_ or policy.learns(cfg) else 3.0
+    @property
+    def _walks_first(self) -> bool:
+        return self.cfg.episodes == "frozen" and self.cfg.protocol.exploration > 0
 
+    def consulted(self) -> Sequence[str]:
+        """The part, sounds by their recordings, and what is made of a finished run."""
+        return ("part", "sound", "film", "film_show")
 
-def _walk(cfg: DictConfig, folder: Path) -> None:
-    rooms = scenes.scenes(cfg, (cfg.part,))[cfg.part]
-    wanted = wanted_by(cfg)
-    hearing, sights = observations.heard(cfg, rooms, wanted), observations.seen(cfg, rooms, wanted)
-    episodes = pd.concat(walk_rooms(cfg, rooms, hearing, sights), ignore_index=True)
-    protocol: Protocol = instantiate(cfg.protocol)
-    walks = [episodes_of(cfg, room, protocol).walks for room in rooms]
-    perception_tables.write(cfg, rooms, walks, hearing, sights, folder)
-    summary = results.summarise(episodes)
-    _log(cfg, folder, summary)
-    with written_whole(folder / "config.yaml") as part:
-        OmegaConf.save(cfg, part, resolve=True)
-    results.write_csv(episodes, folder / EPISODE_RECORDS)
-    results.write_csv(summary, folder / RESULTS)
+    def content(self) -> Any:
+        """The recordings."""
+        return sounds_content(self.cfg)
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        cfg = self.cfg
+        return f"run of '{cfg.agent.name}' (seed {cfg.seed}, train_seed {cfg.train_seed})"
+
+    @property
+    def folder(self) -> Path:
+        """`outputs/eval/<agent>/<sounds>/seed<seed>-<hash8>`."""
+        sounds = "-".join(sound_files(self.cfg))
+        check_name("agent.name", self.cfg.agent.name)
+        name = f"seed{self.cfg.seed}-{self.fingerprint[:8]}"
+        return Path(self.cfg.outputs) / "eval" / self.cfg.agent.name / sounds / name
+
+    def seconds(self) -> float:
+        """A few seconds, more where a map or a network is at work."""
+        return 15.0 if self.cfg.planner._target_ or learns(self.cfg) else 3.0
+
+    def check(self) -> None:
+        """Refuse options that cannot work, before anything is made."""
+        cfg = self.cfg
+        if not 0 <= cfg.seed < 2**62:
+            raise UserError(f"seed: {cfg.seed} is out of range; give 0 or more")
+        for key, known in (
+            ("episodes", EPISODES),
+            ("part", PARTS),
+            ("exploration", EXPLORATIONS),
+        ):
+            if cfg[key] not in known:
+                raise UserError(f"{key}: '{cfg[key]}' is none of {', '.join(known)}")
+        instantiate(cfg.protocol)  # rules that contradict themselves are refused first
+        agent = build_agent(cfg)
+        if agent.privileged != cfg.agent.privileged:
+            raise UserError(
+                f"agent.privileged: {cfg.agent.privileged}, but '{type(agent).__name__}' is "
+                f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
+            )
+        self.observed.check(type(agent).__name__)
+        dry_sounds(cfg)  # a bad file is refused before anything is made
+
+    def done(self) -> bool:
+        """Whether all its episodes have been walked."""
+        return (self.folder / RESULTS).is_file()
+
+    def make(self) -> None:
+        """Walk, and write `episodes.csv`, `results.csv` and TensorBoard."""
+        cfg, folder, rooms = self.cfg, self.folder, self.geometry.load()
+        hearing, sights = self.observed.load(rooms)
+        episodes = pd.concat(walk_rooms(cfg, rooms, hearing, sights), ignore_index=True)
+        protocol: Protocol = instantiate(cfg.protocol)
+        walks = [episodes_of(cfg, room, protocol).walks for room in rooms]
+        perception_tables.write(self.observed, rooms, walks, hearing, sights, folder)
+        summary = results.summarise(episodes)
+        _log(cfg, folder, summary)
+        with written_whole(folder / "config.yaml") as part:
+            OmegaConf.save(cfg, part, resolve=True)
+        results.write_csv(episodes, folder / EPISODE_RECORDS)
+        results.write_csv(summary, folder / RESULTS)
 
 
 def walk_rooms(
@@ -165,7 +205,7 @@ def walk_rooms(
 
 def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
     """The episodes of a room as the config asks for them."""
-    sounds = list(audio_inference.sound_files(cfg))
+    sounds = list(sound_files(cfg))
     if cfg.episodes == "exhaustive":
         return exhaustive_episodes(room, sounds, protocol, cfg.seed)
     return frozen_episodes(room, sounds, protocol, cfg.seed, cfg.exploration)
@@ -203,7 +243,7 @@ def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
     settings |= {"seed": cfg.seed, "train_seed": cfg.train_seed, "episodes": cfg.episodes}
     settings |= {key: cfg[key] for key in ("look", "exploration", "localisation")}
     settings |= {"part": cfg.part, "source": cfg.planner.source}
-    settings["sounds"] = "-".join(audio_inference.sound_files(cfg))
+    settings["sounds"] = "-".join(sound_files(cfg))
     figures = results.headline(summary)
     with SummaryWriter(str(folder)) as writer:
         for row in summary.itertuples():

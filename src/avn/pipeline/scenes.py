@@ -1,7 +1,4 @@
-"""The config's floor plans and scenes, made where they are missing.
-
-A result's folder is named by the hash of what it depends on (docs/architecture.md).
-"""
+"""Scenes as stages: the geometry of apartments, their late reverberation and direct sound."""
 
 from __future__ import annotations
 
@@ -9,138 +6,170 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from omegaconf import DictConfig, OmegaConf
-
+from avn.acoustics import brir
 from avn.acoustics.brir import AcousticsConfig, check_config
 from avn.apartments.floor_plan import FloorPlan
-from avn.apartments.grid import build_grid
-from avn.apartments.splits import SplitConfig, load_split
-from avn.core.errors import UserError
-from avn.core.files import check_name, stage_folder
-from avn.core.hashing import digest
-from avn.dataset import build, scene
-from avn.dataset.build_views import build_views, views_hash, views_made
-from avn.dataset.scene import Scene
-from avn.pipeline.stage import make_once
+from avn.core.files import check_name
+from avn.core.settings import typed
+from avn.dataset import build
+from avn.dataset.scene import AudibleScene, Brirs, Scene, load_scene
+from avn.pipeline.apartments import Apartments, PerApartment, check_processes, scene_folder
 
-PARTS = ("train", "validation", "test")
+# Settings of an acoustic regime; all others shape the reverberation, which regimes share.
+_REGIME = ("name", "first_arrival")
+_HEIGHTS = ("ear_height", "source_height")
 
 
-def typed(node: DictConfig) -> Any:
-    """The dataclass instance that a config node of a schema stands for."""
-    return OmegaConf.to_object(node)
+def acoustics_of(apartments: Apartments) -> AcousticsConfig:
+    """The acoustics of apartments; raises `UserError` for a value that makes no sense."""
+    return check_config(typed(apartments.node("acoustics")), apartments.world.acoustics)
 
 
-def acoustics_of(cfg: DictConfig) -> AcousticsConfig:
-    """The node `acoustics`; raises `UserError` for a value that makes no sense."""
-    return check_config(typed(cfg.acoustics))
+def _keys(apartments: Apartments, names: Sequence[str]) -> list[str]:
+    return [f"{apartments.world.acoustics}.{name}" for name in names]
 
 
-def plans(cfg: DictConfig) -> dict[str, list[FloorPlan]]:
-    """Floor plans of the split, by part: train, validation, test."""
-    return _plans(OmegaConf.to_yaml(cfg.split, resolve=True), typed(cfg.split))
+class Geometry(PerApartment):
+    """Free cells, shortest distances and lines of sight of apartments."""
+
+    kind = "generate/geometry"
+
+    def settings(self) -> Sequence[str]:
+        """The heights of ears and sources, between which there is a line of sight or none."""
+        return _keys(self.apartments, _HEIGHTS)
+
+    def content_of(self, plan: FloorPlan) -> Any:
+        """The floor plan."""
+        return plan.to_dict()
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return f"geometry of {self.apartments.title}"
+
+    @property
+    def folder(self) -> Path:
+        """Where the folders of the apartments lie."""
+        return Path(self.cfg.outputs) / "generate"
+
+    def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
+        """The file of an apartment."""
+        return scene_folder(self.cfg, plan) / f"geometry-{fingerprint[:8]}.h5"
+
+    def check(self) -> None:
+        """Refuse floor plans and acoustics that cannot be."""
+        acoustics_of(self.apartments)
+        for plan in self.apartments.plans:
+            build.check_plan(plan)
+
+    def make(self) -> None:
+        """Write the files that are missing."""
+        acoustics = acoustics_of(self.apartments)
+        for index in self.missing():
+            plan, path = self.apartments.plans[index], self.paths[index]
+            build.build_geometry(plan, acoustics, path, self.fingerprints[index])
+
+    def load(self) -> list[Scene]:
+        """The scene of each apartment."""
+        return [load_scene(*file) for file in zip(self.paths, self.fingerprints, strict=True)]
 
 
-_PLANS: dict[str, dict[str, list[FloorPlan]]] = {}
+class _Acoustic(PerApartment):
+    """What stages share that are made by the acoustics of a world."""
 
+    @property
+    def folder(self) -> Path:
+        """Where the folders of the apartments lie."""
+        return Path(self.cfg.outputs) / "generate"
 
-def _plans(key: str, split: SplitConfig) -> dict[str, list[FloorPlan]]:
-    # the folders' names and the stages ask for the same plans several times in one command
-    if key not in _PLANS:
-        _PLANS[key] = load_split(split)
-    return _PLANS[key]
-
-
-def pairs(cfg: DictConfig, part: str) -> tuple[int, int]:
-    """How many pairs of source and free cell, and how many free cells, the apartments have."""
-    found = [(len(plan.sources), build_grid(plan).cells) for plan in plans(cfg)[part]]
-    return sum(sources * cells for sources, cells in found), sum(cells for _, cells in found)
-
-
-def scenes_folder(cfg: DictConfig) -> Path:
-    """The folder that holds the scene folders of the split."""
-    acoustics = acoustics_of(cfg)
-    hashes = [build.tail_hash(plan, acoustics) for part in plans(cfg).values() for plan in part]
-    return stage_folder(cfg.outputs, "generate", cfg.split.name, digest(hashes))
-
-
-def scenes(
-    cfg: DictConfig, parts: Sequence[str] = PARTS, audible: bool = False, asked: bool = False
-) -> dict[str, list[Scene]]:
-    """The scenes of some parts of the split, made where they are missing.
-
-    Parameters
-    ----------
-    parts : sequence of {"train", "validation", "test"}
-    audible : bool
-        Whether their impulse responses must be there too, in the regime of `acoustics`.
-    asked : bool
-        Whether it is them that the user asked for, so that `auto=false` does not refuse them.
-
-    Raises
-    ------
-    UserError
-        Where a part has no apartment, or something is missing and `auto` is false.
-    """
-    chosen = {part: plans(cfg)[part] for part in parts}
-    for part, found in chosen.items():
-        if not found:
-            raise UserError(f"split.{part}: split '{cfg.split.name}' has no {part} apartment")
-    acoustics = acoustics_of(cfg)
-    check_name("split.name", cfg.split.name)
-    check_name("acoustics.name", cfg.acoustics.name)
-    if not cfg.outputs:
-        raise UserError("outputs: empty; give the path of a folder")
-    if cfg.processes < 1:
-        raise UserError(f"processes: {cfg.processes} is less than 1; give 1 or more")
-    folder = scenes_folder(cfg)
-    auto = cfg.auto or asked
-    for plan in (plan for found in chosen.values() for plan in found):
-        if not auto and not scene.geometry_file(folder / plan.name).is_file():
-            raise UserError(
-                f"{folder / plan.name}: scene is missing and auto=false; leave auto=true to make it"
-            )
-    opened = {
-        part: [build.build_geometry(plan, acoustics, folder / plan.name) for plan in found]
-        for part, found in chosen.items()
-    }
-    if audible:
-        every = [which for found in opened.values() for which in found]
-        pairs = sum(len(which.sources) * which.grid.cells for which in every)
-        make_once(
-            folder,
-            f"sound of the {', '.join(parts)} apartments of '{cfg.split.name}' ({acoustics.name})",
-            done=lambda: build.acoustics_made(every, acoustics),
-            make=lambda: build.build_acoustics(every, acoustics, cfg.processes),
-            auto=auto,
-            seconds=pairs * 0.02 / cfg.processes,
+    def check(self) -> None:
+        """Refuse acoustics that cannot be."""
+        acoustics_of(self.apartments)
+        check_processes(self.cfg)
+        check_name(
+            f"{self.apartments.world.acoustics}.name", self.apartments.node("acoustics").name
         )
-    return opened
 
 
-def views_hashes(cfg: DictConfig, parts: Sequence[str]) -> dict[str, list[str]]:
-    """Hash of the views of each apartment of some parts of the split."""
-    renderer = typed(cfg.renderer)
-    return {part: [views_hash(plan, part, renderer) for plan in plans(cfg)[part]] for part in parts}
+class LateReverberation(_Acoustic):
+    """Sound that reaches each cell after reflections, traced; the regimes share it."""
+
+    kind = "generate/late_reverberation"
+
+    def needs(self) -> Sequence[Geometry]:
+        """The geometry of the same apartments."""
+        return (Geometry(self.cfg, self.apartments),)
+
+    def settings(self) -> Sequence[str]:
+        """The acoustics, without what tells the regimes apart."""
+        return (self.apartments.world.acoustics,)
+
+    def ignored(self) -> Sequence[str]:
+        """What tells the regimes apart."""
+        return _keys(self.apartments, _REGIME)
+
+    def content(self) -> Any:
+        """The tables of materials and heads."""
+        return brir.assets_hash()
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return f"reverberation of {self.apartments.title}"
+
+    def seconds(self) -> float:
+        """About 20 ms for each pair of source and cell."""
+        return self.apartments.pairs * 0.02 / max(1, self.cfg.processes)
+
+    def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
+        """The file of an apartment."""
+        return scene_folder(self.cfg, plan) / f"acoustics-tail-{fingerprint[:8]}.h5"
+
+    def make(self) -> None:
+        """Trace what is missing, in worker processes."""
+        scenes, acoustics = self.needs()[0].load(), acoustics_of(self.apartments)
+        files = [(scenes[i], self.paths[i], self.fingerprints[i]) for i in self.missing()]
+        build.build_reverberation(files, acoustics, self.cfg.processes)
 
 
-def seen_scenes(
-    cfg: DictConfig, parts: Sequence[str] = PARTS, asked: bool = False
-) -> dict[str, list[Scene]]:
-    """The scenes of some parts of the split with their views, made where they are missing.
+class DirectSound(_Acoustic):
+    """First arrivals in a regime; with the reverberation these are the impulse responses."""
 
-    Parameters and errors are those of `scenes`.
-    """
-    check_name("renderer.name", cfg.renderer.name)
-    opened, renderer = scenes(cfg, parts, asked=asked), typed(cfg.renderer)
-    every = [(which, part) for part, found in opened.items() for which in found]
-    count = sum(4 * which.grid.cells for which, _ in every)
-    make_once(
-        scenes_folder(cfg),
-        f"views of the {', '.join(parts)} apartments of '{cfg.split.name}' ({renderer.name})",
-        done=lambda: views_made(every, renderer),
-        make=lambda: build_views(every, renderer, cfg.processes),
-        auto=cfg.auto or asked,
-        seconds=(count * 0.06 + 60 * len(every)) / cfg.processes,
-    )
-    return opened
+    kind = "generate/direct_sound"
+
+    def needs(self) -> Sequence[Any]:
+        """The geometry and the reverberation of the same apartments."""
+        own = (self.cfg, self.apartments)
+        return (Geometry(*own), LateReverberation(*own))
+
+    def settings(self) -> Sequence[str]:
+        """What tells the regimes apart."""
+        return _keys(self.apartments, _REGIME)
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return f"sound of {self.apartments.title} ({self.apartments.node('acoustics').name})"
+
+    def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
+        """The file of an apartment."""
+        regime = self.apartments.node("acoustics").name
+        return scene_folder(self.cfg, plan) / f"acoustics-{regime}-{fingerprint[:8]}.h5"
+
+    def make(self) -> None:
+        """Write the files that are missing."""
+        scenes, acoustics = self.needs()[0].load(), acoustics_of(self.apartments)
+        for index in self.missing():
+            build.build_direct_sound(
+                scenes[index], acoustics, self.paths[index], self.fingerprints[index]
+            )
+
+    def load(self) -> list[AudibleScene]:
+        """The scene of each apartment with its binaural impulse responses."""
+        geometry, tails = self.needs()
+        tail_files = zip(tails.paths, tails.fingerprints, strict=True)
+        first_files = zip(self.paths, self.fingerprints, strict=True)
+        return [
+            scene.with_brirs(Brirs(tail, first, len(scene.sources), scene.grid.cells))
+            for scene, tail, first in zip(geometry.load(), tail_files, first_files, strict=True)
+        ]

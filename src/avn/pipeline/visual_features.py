@@ -1,82 +1,79 @@
-"""The features by which places are known again, made where they are missing."""
+"""Visual embeddings, by which places are known again, as a stage."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import torch
-from omegaconf import DictConfig
 from torch import Tensor
 
+from avn.apartments.floor_plan import FloorPlan
 from avn.core.files import check_name
-from avn.core.hashing import digest
 from avn.core.progress import progress_bar
-from avn.dataset.features import features_file, read_features, write_features
-from avn.dataset.scene import Scene
-from avn.dataset.scene_file import is_there
-from avn.pipeline import scenes
-from avn.pipeline.stage import make_once
-from avn.views.backbone import backbone_class, backbone_hash
-from avn.views.backbone import features as features_of
+from avn.core.settings import typed
+from avn.dataset.features import read_features, write_features
+from avn.pipeline.apartments import PerApartment, cells_of, scene_folder
+from avn.pipeline.views import RenderedViews
+from avn.views.backbone import backbone_class, backbone_hash, features
 
 
-def features_hash(cfg: DictConfig, views_made_from: str) -> str:
-    """Hash of the features of one apartment's views."""
-    return digest(views_made_from, backbone_hash(scenes.typed(cfg.backbone)))
+class VisualEmbeddings(PerApartment):
+    """What a backbone makes of every view of apartments."""
 
+    kind = "generate/visual_embeddings"
 
-def features(cfg: DictConfig, parts: Sequence[str]) -> dict[str, list[Tensor]]:
-    """Features of the views of every state of the apartments of some parts of the split.
+    def needs(self) -> Sequence[RenderedViews]:
+        """The views."""
+        return (RenderedViews(self.cfg, self.apartments),)
 
-    Returns
-    -------
-    dict of list of (S, D) float32 tensor
-        l2-normalised.
+    def consulted(self) -> Sequence[str]:
+        """The backbone, whose weights are in the fingerprint."""
+        return (*super().consulted(), "backbone")
 
-    Raises
-    ------
-    UserError
-        Where the backbone's weights cannot be had, a file is damaged or of another making, or
-        something is missing and `auto` is false.
-    """
-    check_name("backbone.name", cfg.backbone.name)
-    opened, hashes = scenes.scenes(cfg, parts), scenes.views_hashes(cfg, parts)
-    name = cfg.backbone.name
-    if cfg.renderer.name != "raycast":  # two renderers' features lie beside each other
-        name += f"-{cfg.renderer.name}"
-    every = [
-        (which, views, features_hash(cfg, views))
-        for part in parts
-        for which, views in zip(opened[part], hashes[part], strict=True)
-    ]
+    def content(self) -> Any:
+        """The backbone's weights and input size."""
+        return backbone_hash(typed(self.cfg.backbone))
 
-    def missing() -> list[tuple[Scene, str, str]]:
-        return [e for e in every if not is_there(features_file(e[0].folder, name), e[2])]
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return f"visual embeddings of {self.apartments.title} ({self.cfg.backbone.name})"
 
-    def make() -> None:
-        scenes.seen_scenes(cfg, parts)
-        backbone = backbone_class(scenes.typed(cfg.backbone))(scenes.typed(cfg.backbone))
-        for which, views, own in missing():
-            seen = which.views(cfg.renderer.name, views)
-            with progress_bar(f"features of {which.name}", len(seen.rgb), "views") as done:
-                found = features_of(backbone, seen.rgb, done)
-            write_features(which.folder, name, found, own, views)
+    @property
+    def folder(self) -> Path:
+        """Where the folders of the apartments lie."""
+        return Path(self.cfg.outputs) / "generate"
 
-    states = sum(4 * which.grid.cells for which, _, _ in every)
-    make_once(
-        scenes.scenes_folder(cfg),
-        f"features of the {', '.join(parts)} views ({name})",
-        done=lambda: not missing(),
-        make=make,
-        auto=cfg.auto,
-        seconds=states / 100,
-    )
-    return {
-        part: [
-            torch.from_numpy(
-                read_features(which.folder, name, 4 * which.grid.cells, features_hash(cfg, views))
-            )
-            for which, views in zip(opened[part], hashes[part], strict=True)
+    def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
+        """The file of an apartment."""
+        name = f"features-{self.cfg.backbone.name}-{fingerprint[:8]}.h5"
+        return scene_folder(self.cfg, plan) / name
+
+    def seconds(self) -> float:
+        """About 10 ms a view."""
+        return 4 * self.apartments.cells / 100
+
+    def check(self) -> None:
+        """Refuse a name that leads the file astray."""
+        check_name("backbone.name", self.cfg.backbone.name)
+
+    def make(self) -> None:
+        """Apply the backbone where a file is missing."""
+        config = typed(self.cfg.backbone)
+        backbone = backbone_class(config)(config)
+        views = self.needs()[0].load()
+        for index in self.missing():
+            rgb, name = views[index].rgb, self.apartments.plans[index].name
+            with progress_bar(f"features of {name}", len(rgb), "views") as done:
+                found = features(backbone, rgb, done)
+            write_features(self.paths[index], found, self.fingerprints[index])
+
+    def load(self) -> list[Tensor]:
+        """The embeddings of each apartment, (S, D) float32, l2-normalised."""
+        files = zip(self.apartments.plans, self.paths, self.fingerprints, strict=True)
+        return [
+            torch.from_numpy(read_features(path, 4 * cells_of(plan), own))
+            for plan, path, own in files
         ]
-        for part in parts
-    }

@@ -1,0 +1,41 @@
+"""The recordings of the test world and of the training world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from omegaconf import DictConfig
+
+from avn.acoustics.clips import DrySounds
+from avn.acoustics.dry_sounds import content_hash, load_sounds
+from avn.core.errors import UserError
+from avn.core.files import check_name
+from avn.core.settings import plain
+from avn.pipeline.apartments import TEST, World
+from avn.reporting.results import ALL_SOUNDS
+
+
+def sound_files(cfg: DictConfig, world: World = TEST) -> dict[str, str]:
+    """The sounds of a world: name to built-in recording or path.
+
+    Raises
+    ------
+    UserError
+        For a name that tables and folders need for something else.
+    """
+    sounds = {str(name): str(path) for name, path in plain(cfg, world.sounds).items()}
+    for name in sounds:
+        check_name(world.sounds, name)
+        if name == ALL_SOUNDS:
+            raise UserError(f"{world.sounds}: '{name}' is the row of all sounds; rename it")
+    return sounds
+
+
+def dry_sounds(cfg: DictConfig, world: World = TEST) -> DrySounds:
+    """The recordings of a world; raises `UserError` where one cannot be read."""
+    return DrySounds(load_sounds(sound_files(cfg, world)))
+
+
+def sounds_content(cfg: DictConfig, world: World = TEST) -> list[Any]:
+    """The sounds of a world in their order, each with a hash of its recording."""
+    return list(content_hash(sound_files(cfg, world)).items())

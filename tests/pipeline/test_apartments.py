@@ -1,0 +1,62 @@
+"""Apartments of the parts of a split, and the scenes that their stages make."""
+
+import shutil
+
+import pytest
+import torch
+from small import composed
+
+from avn.apartments.splits import FROZEN
+from avn.core.errors import UserError
+from avn.pipeline.apartments import TRAINING, Apartments, apartments_of_every_part
+from avn.pipeline.scenes import DirectSound, Geometry
+from avn.pipeline.stage import build
+
+FEW = ("split=mini", "acoustics.rays=300", "acoustics.seconds=0.2", "processes=1")
+
+
+def test_a_part_without_apartments_is_named_where_it_is_needed(tmp_path):
+    folder = shutil.copytree(FROZEN / "var", tmp_path / "plans")
+    for path in folder.glob("train_*.json"):
+        path.unlink()
+    cfg = composed(f"split.folder={folder}", "split.name=own")
+    assert len(Apartments(cfg, "test").plans) == 5
+    assert [own.part for own in apartments_of_every_part(cfg)] == ["validation", "test"]
+    with pytest.raises(UserError, match=r"split\.train is empty: no floor plan of that part in"):
+        Apartments(cfg, "train").plans  # noqa: B018
+    with pytest.raises(UserError, match=r"training\.scenes\.train is empty"):
+        Apartments(cfg, "train", TRAINING).plans  # noqa: B018
+
+
+def test_cells_and_pairs_are_those_of_the_scenes(outputs):
+    cfg = composed(*FEW, f"outputs={outputs}")
+    apartments = Apartments(cfg, "train")
+    geometry = Geometry(cfg, apartments)
+    build(geometry)
+    scenes = geometry.load()
+    assert apartments.cells == sum(scene.grid.cells for scene in scenes)
+    assert apartments.pairs == sum(scene.grid.cells * len(scene.sources) for scene in scenes)
+
+
+def test_the_two_worlds_sound_alike_or_not_as_they_are_told(outputs):
+    cfg = composed(
+        *FEW,
+        f"outputs={outputs}",
+        "acoustics=diffraction",
+        "+acoustics@training.acoustics=resonance",
+        "training.acoustics.rays=300",
+        "training.acoustics.seconds=0.2",
+    )
+    test, training = (Apartments(cfg, "validation", world) for world in (TRAINING, TRAINING))
+    assert DirectSound(cfg, test).paths == DirectSound(cfg, training).paths
+    stages = [DirectSound(cfg, Apartments(cfg, "validation")), DirectSound(cfg, training)]
+    for stage in stages:
+        build(stage)
+    one, other = (stage.load()[0] for stage in stages)
+    hidden = (~torch.from_numpy(one.in_sight)).nonzero()[0]
+    pair = hidden[:1], 4 * hidden[1:]
+    # without a wall between them they are the same, behind one they are not
+    assert not torch.equal(one.brirs.gather(*pair), other.brirs.gather(*pair))
+    seen = torch.from_numpy(one.in_sight).nonzero()[0]
+    pair = seen[:1], 4 * seen[1:]
+    assert torch.equal(one.brirs.gather(*pair), other.brirs.gather(*pair))

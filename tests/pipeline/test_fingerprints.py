@@ -1,0 +1,231 @@
+"""Which settings make which product anew: those that change it must, all others must not."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+from omegaconf import OmegaConf
+from small import composed
+
+from avn.apartments.generator import generate
+from avn.config.folder import conf_folder
+from avn.core.errors import UserError
+from avn.pipeline.agent import build_agent
+from avn.pipeline.apartments import TRAINING, Apartments
+from avn.pipeline.occupancy import LocalPatches, OccupancyNetwork
+from avn.pipeline.policy import Policy
+from avn.pipeline.run import Evaluation
+from avn.pipeline.scenes import DirectSound, Geometry, LateReverberation
+from avn.pipeline.sound_network import SoundNetwork, SourceEstimates, hears
+from avn.pipeline.stop_classifier import StopNetwork, StopProbabilities
+from avn.pipeline.views import RenderedViews
+from avn.pipeline.visual_features import VisualEmbeddings
+
+MINI = ("agent=ours_exp", "split=mini", "protocol=var_stop", "occupancy_model=small")
+NONE = set()
+RUN = {"run"}
+# what listens, what it hears, and where
+HEARD = {"run", "estimates", "stops"}
+EARS = HEARD | {"sound", "stop", "policy"}
+DIRECT = EARS | {"direct"}
+SOUNDING = DIRECT | {"tail"}
+LOOKING = {"patches", "run_windows", "policy_map"}
+SEEN = {"views", "occupancy", "embeddings", "run", "policy"} | LOOKING
+EVERY = SOUNDING | SEEN | {"geometry"}
+
+
+@cache
+def products(*overrides):
+    cfg = composed(*MINI, *overrides)
+    apartments = Apartments(cfg, "test")
+    actor = composed("agent=a3c_va", "split=mini", *_fitting(overrides))
+    mapping = composed("agent=a3c_va_mapper", "split=mini", *_fitting(overrides))
+    windows = composed("agent=ours_noexp", "split=mini", *_fitting(overrides))
+    return {
+        "geometry": Geometry(cfg, apartments),
+        "tail": LateReverberation(cfg, apartments),
+        "direct": DirectSound(cfg, apartments),
+        "views": RenderedViews(cfg, apartments),
+        "embeddings": VisualEmbeddings(cfg, apartments),
+        "sound": SoundNetwork(cfg),
+        "stop": StopNetwork(cfg),
+        "occupancy": OccupancyNetwork(cfg),
+        "estimates": SourceEstimates(cfg, apartments),
+        "stops": StopProbabilities(cfg, apartments),
+        "patches": LocalPatches(cfg, apartments),
+        "policy": Policy(actor),
+        "policy_map": Policy(mapping),
+        "run": Evaluation(cfg),
+        "run_windows": Evaluation(windows),
+    }
+
+
+def _fitting(overrides):
+    """Overrides of keys that the other rows have too."""
+    own = ("agent.", "planner.", "mapper.top", "stop_model", "protocol", "occupancy_model")
+    return [text for text in overrides if not text.startswith(own)]
+
+
+def moved(override):
+    one, other = products(), products(override)
+    return {name for name in one if one[name].fingerprint != other[name].fingerprint}
+
+
+@pytest.mark.parametrize(
+    ("override", "wanted"),
+    [
+        ("outputs=elsewhere", NONE),
+        ("processes=1", NONE),
+        ("auto=false", NONE),
+        ("protocol.radius=3", NONE),  # of another goal
+        ("planner.error.near=3", NONE),  # of another filter
+        ("stop_model.criterion=balanced", RUN),
+        ("stop_model.threshold=0.7", RUN),
+        ("protocol.starts=5", RUN),
+        ("mapper.top=2", RUN),
+        ("planner.patience=5", RUN),
+    ],
+)
+def test_how_an_agent_acts_is_no_part_of_what_it_learnt(override, wanted):
+    assert moved(override) == wanted
+
+
+@pytest.mark.parametrize(
+    ("override", "wanted"),
+    [
+        ("seed=5", RUN | {"run_windows"}),
+        ("episodes=exhaustive", RUN | {"run_windows"}),
+        ("sound=alarm", HEARD | {"run_windows"}),
+        ("takes=2", HEARD | {"run_windows", "policy", "policy_map"}),
+        ("sound_model.epochs=3", {*EARS, "run_windows", "policy_map"} - {"stops", "stop"}),
+        ("stop_model.positives=0.5", {"stop", "stops", "run"}),
+        ("protocol=stop", {"stop", "stops", "run"}),
+        ("occupancy_model.epochs=3", {"occupancy", "patches"}),
+        ("occupancy_model.looks=3", {"occupancy", "patches"}),
+        ("renderer.camera.pitch=-20", SEEN),
+        ("backbone.size=64", {"embeddings", "run", "policy", "policy_map"}),
+        ("a3c.gamma=0.9", {"policy", "policy_map"}),
+        ("a3c.walks=3", NONE),  # neither explores
+        # the regimes share the reverberation
+        ("acoustics=diffraction", {*DIRECT, "run_windows", "policy_map"}),
+        ("acoustics.rays=500", {*SOUNDING, "run_windows", "policy_map"}),
+        ("acoustics.ear_height=1.4", {*SOUNDING, "geometry", "run_windows", "policy_map"}),
+        ("split.seed=9", EVERY),
+    ],
+)
+def test_a_setting_makes_anew_what_it_changes(override, wanted):
+    assert moved(override) == wanted
+
+
+@pytest.mark.parametrize("kind", [SoundNetwork, StopNetwork, OccupancyNetwork, Policy])
+@pytest.mark.parametrize(
+    "override",
+    [
+        "sound=alarm",
+        "+sound.beep=ring",
+        "microphone.gain=0.5",
+        "microphone.noise_rms=0.02",
+        "split=elsewhere",
+        "acoustics=diffraction",
+        "seed=3",
+    ],
+)
+def test_no_change_of_the_test_world_makes_a_network_anew(kind, override, tmp_path):
+    """Where the training world is given its own apartments and acoustics."""
+    own = ("+split@training.scenes=mini", "+acoustics@training.acoustics=resonance")
+    row = ("agent=a3c_va_mapper", "stop_model=cnn5", "split=mini", *own)
+    before, after = composed(*row), composed(*row, *_apartments(override, tmp_path))
+    assert kind(before).fingerprint == kind(after).fingerprint
+    assert not any(key.startswith(("sound.", "microphone.")) for key in kind(after).read())
+
+
+def _apartments(override, folder):
+    if override != "split=elsewhere":
+        return (override,)
+    plan = generate(77, "mine", sources=2, size="small")
+    (folder / "mine.json").write_text(plan.to_json())
+    return (f"split.folder={folder}", "split.name=new")
+
+
+def test_another_test_apartment_makes_no_other_apartment_anew(tmp_path):
+    for seed in (1, 2):
+        plan = generate(seed, f"flat_{seed}", sources=2, size="small")
+        (tmp_path / f"flat_{seed}.json").write_text(plan.to_json())
+    split = (f"split.folder={tmp_path}", "split.name=new")
+    before = Apartments(composed(*split), "test")
+    one = DirectSound(before.cfg, before).fingerprints, RenderedViews(before.cfg, before).paths
+    plan = generate(3, "flat_0", sources=2, size="small")
+    (tmp_path / "flat_0.json").write_text(plan.to_json())
+    after = Apartments(composed(*split, "split.seed=1"), "test")  # read anew
+    assert DirectSound(after.cfg, after).fingerprints[1:] == one[0]
+    assert RenderedViews(after.cfg, after).paths[1:] == one[1]
+
+
+def test_the_training_world_follows_the_test_world_until_it_is_chosen():
+    cfg = composed("acoustics=diffraction", "acoustics.rays=300", "split=mini")
+    assert OmegaConf.to_container(cfg.training.acoustics) == OmegaConf.to_container(cfg.acoustics)
+    assert cfg.training.scenes.name == "mini"
+    # what records and sounds in training is the training world's own
+    cfg = composed("microphone.gain=0.5", "sound=alarm")
+    assert cfg.training.microphone.gain == 1.0
+    assert list(cfg.training.sounds) == ["ring", "alarm", "clock"]
+    own = composed("acoustics=diffraction", "+acoustics@training.acoustics=resonance")
+    assert own.training.acoustics.first_arrival == "through_walls"
+    assert own.acoustics.first_arrival == "round_corners"
+
+
+def test_equal_worlds_share_their_sound_and_other_parts_share_no_views():
+    cfg = composed("split=mini", "+acoustics@training.acoustics=resonance")
+    test, training = Apartments(cfg, "validation"), Apartments(cfg, "validation", TRAINING)
+    assert DirectSound(cfg, test).paths == DirectSound(cfg, training).paths
+    assert RenderedViews(cfg, test).paths == RenderedViews(cfg, training).paths
+    assert RenderedViews(cfg, test).paths != RenderedViews(cfg, test, look=1).paths
+
+
+def test_a_radius_is_another_goal():
+    row = ("agent=ours_noexp", "protocol=stop", "split=mini")
+    one, other = (StopNetwork(composed(*row, f"protocol.radius={r}")) for r in (1, 2))
+    assert one.fingerprint != other.fingerprint
+
+
+def test_sounds_are_told_apart_by_their_order():
+    one, other = (
+        Evaluation(composed("split=mini", f"sound={sounds}"))
+        for sounds in ("[ring,alarm]", "[alarm,ring]")
+    )
+    assert one.fingerprint != other.fingerprint
+
+
+def test_a_threshold_of_the_config_needs_no_network():
+    row = ("agent=ours_noexp", "protocol=var_stop", "split=mini")
+    given = Evaluation(composed(*row, "stop_model.threshold=0.7"))
+    assert StopNetwork(given.cfg).threshold() == 0.7
+    # the probabilities are those of the network all the same, but only if they are missing
+    assert not any(isinstance(need, StopNetwork) for need in given.needs())
+    assert any(isinstance(need, StopNetwork) for need in Evaluation(composed(*row)).needs())
+    with pytest.raises(UserError, match=r"stop_model\.criterion: 'best'"):
+        StopNetwork(composed(*row, "stop_model.criterion=best")).threshold()
+
+
+@pytest.mark.parametrize(
+    ("kind", "line"),
+    [
+        (SoundNetwork, "sound_model: 'none' cannot hear; choose cnn5 or released"),
+        (StopNetwork, "stop_model: 'none' cannot say Stop; choose cnn5"),
+        (OccupancyNetwork, "occupancy_model: 'none' sees no free cells; choose small or released"),
+        (Policy, "agent: 'random_walk' is no actor-critic"),
+    ],
+)
+def test_what_a_config_does_not_have_is_refused(kind, line):
+    with pytest.raises(UserError, match=line):
+        kind(composed("agent=random_walk")).check()
+
+
+@pytest.mark.parametrize(
+    "row", sorted(path.stem for path in (Path(conf_folder()) / "agent").glob("*.yaml"))
+)
+def test_only_rows_that_say_so_are_shown_the_truth(row):
+    cfg = composed(f"agent={row}", "split=mini")
+    agent = build_agent(cfg)
+    assert agent.privileged == cfg.agent.privileged == (row == "oracle")
+    assert "sound" not in agent.needs or hears(cfg)
