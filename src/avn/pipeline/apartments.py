@@ -146,6 +146,11 @@ class PerApartment(Stage):
         """The split, whose floor plans are in the fingerprint."""
         return (self.apartments.world.split,)
 
+    @property
+    def folder(self) -> Path:
+        """Where the folders of the apartments lie."""
+        return Path(self.cfg.outputs) / "generate"
+
     @cached_property
     def fingerprints(self) -> list[str]:
         """The fingerprint of each apartment's file."""

@@ -47,11 +47,6 @@ class Geometry(PerApartment):
         """What it is."""
         return f"geometry of {self.apartments.title}"
 
-    @property
-    def folder(self) -> Path:
-        """Where the folders of the apartments lie."""
-        return Path(self.cfg.outputs) / "generate"
-
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
         """The file of an apartment."""
         return scene_folder(self.cfg, plan) / f"geometry-{fingerprint[:8]}.h5"
@@ -76,11 +71,6 @@ class Geometry(PerApartment):
 
 class _Acoustic(PerApartment):
     """What stages share that are made by the acoustics of a world."""
-
-    @property
-    def folder(self) -> Path:
-        """Where the folders of the apartments lie."""
-        return Path(self.cfg.outputs) / "generate"
 
     def check(self) -> None:
         """Refuse acoustics that cannot be."""

@@ -61,11 +61,6 @@ class RenderedViews(PerApartment):
             f", look {self.look})" if self.look else ")"
         )
 
-    @property
-    def folder(self) -> Path:
-        """Where the folders of the apartments lie."""
-        return Path(self.cfg.outputs) / "generate"
-
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
         """The file of an apartment."""
         name = f"views-{self.cfg.renderer.name}-{fingerprint[:8]}.h5"

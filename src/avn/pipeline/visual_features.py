@@ -41,11 +41,6 @@ class VisualEmbeddings(PerApartment):
         """What it is."""
         return f"visual embeddings of {self.apartments.title} ({self.cfg.backbone.name})"
 
-    @property
-    def folder(self) -> Path:
-        """Where the folders of the apartments lie."""
-        return Path(self.cfg.outputs) / "generate"
-
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
         """The file of an apartment."""
         name = f"features-{self.cfg.backbone.name}-{fingerprint[:8]}.h5"
