@@ -23,6 +23,7 @@ from avn.apartments.local_patch import window_cells
 from avn.dataset.source_locations import relative_locations
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import exhaustive_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 from avn.planning import shortest_path
@@ -48,14 +49,14 @@ STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
 COMPARED = 4
 
 
-def senses(place: DrawnPlace) -> tuple[dict, dict]:
+def senses(place: DrawnPlace) -> SceneObservations:
     """True hearing with an error of a cell or so, and true windows."""
     lattice = torch.from_numpy(place.grid.lattice).long()
     where = relative_locations(lattice, torch.from_numpy(np.asarray(place.sources)).long())
     generator = torch.Generator().manual_seed(0)
     sound = where + 0.7 * torch.randn(where.shape, generator=generator)
     windows = torch.from_numpy(window_cells(place.grid) >= 0).float()
-    return {"sound": sound[:, :, None, None]}, {"window": windows}
+    return SceneObservations({"sound": sound[:, :, None, None]}, {"window": windows})
 
 
 def peer_graph(cost: np.ndarray, walls: np.ndarray, turn: float) -> nx.DiGraph:
@@ -111,12 +112,12 @@ def main() -> None:
     """Print both rates, their ratio, and what 1,500 episodes take."""
     torch.set_num_threads(1)
     place = draw("flat", FLAT)
-    hearing, sights = senses(place)
+    observed = senses(place)
     episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
     agent, labels = PlannerAgent(OccupancyMapper(41)), Labels("ours_noexp", "resonance")
-    walk_room(agent, place, episodes, VAR, labels, hearing, sights)  # compiles
+    walk_room(agent, place, episodes, VAR, labels, observed)  # compiles
     planner_agent.first_actions = timed = Timed()
-    walk_room(agent, place, episodes, VAR, labels, hearing, sights)
+    walk_room(agent, place, episodes, VAR, labels, observed)
     planner_agent.first_actions = shortest_path.first_actions
     own = timed.plans / timed.seconds
     peer = timed.peer_plans / timed.peer_seconds
@@ -125,7 +126,7 @@ def main() -> None:
     print(f"ratio: {own / peer:.0f} times")
     agent = PlannerAgent(OccupancyMapper())
     start = time.perf_counter()
-    frame = walk_room(agent, place, episodes, VAR, labels, hearing, sights)
+    frame = walk_room(agent, place, episodes, VAR, labels, observed)
     summarise(frame)
     seconds = (time.perf_counter() - start) * 1500 / len(frame)
     print(f"1,500 episodes of ours_noexp with figures: {seconds:.1f} s, one thread")

@@ -24,6 +24,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from avn.apartments.local_patch import window_cells
 from avn.dataset.source_locations import relative_locations
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.starts import build_starts
@@ -73,24 +74,24 @@ def world_tables() -> tuple[list, Tables]:
     """Two copies of the flat, with random pictures and sound that tells where it comes from."""
     places = [draw("one", FLAT), draw("two", FLAT)]
     generator = torch.Generator().manual_seed(0)
-    hearing, sights = [], []
+    observed = []
     project = torch.randn(2, 258, generator=generator)
     for place in places:
         lattice = torch.from_numpy(place.grid.lattice).long()
         where = relative_locations(lattice, torch.from_numpy(np.asarray(place.sources)).long())
         clips = where[:, :, None, None].expand(-1, -1, 3, 4, -1) @ project
         heard = clips + torch.randn(clips.shape, generator=generator)
-        hearing.append({"sound_feature": heard.half()})
         pictures = torch.randn(4 * len(lattice), 1280, generator=generator)
         windows = torch.from_numpy(window_cells(place.grid) >= 0).float()
-        sights.append({"feature": torch.nn.functional.normalize(pictures), "window": windows})
-    return places, build_tables(places, VAR, hearing, sights)
+        visual = {"feature": torch.nn.functional.normalize(pictures), "window": windows}
+        observed.append(SceneObservations({"sound_feature": heard.half()}, visual))
+    return places, build_tables(places, VAR, observed)
 
 
 def task_of(row: str, places: list, tables: Tables, **recipe) -> Task:
     """What there is to learn in a row of the table."""
     names = ROWS[row]
-    both = {**tables.sights, **tables.hearing}
+    both = {**tables.visual, **tables.audio}
     features = {name: both[name].shape[-1] for name in names if name in both}
     memory, maps = 128 * ("memory" in names), "map" in names
     shape = Shape(features, VAR.actions, WIDTH, memory, maps * (2 if memory else 1))

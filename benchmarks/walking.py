@@ -26,6 +26,7 @@ from avn.core.actions import BACKWARD, FORWARD, ROTATE_LEFT, ROTATE_RIGHT, trans
 from avn.core.random import scramble
 from avn.navigation.distances import measure
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
@@ -133,7 +134,7 @@ def plain_walk(tables: Tables, calls: list[tuple[int, int, int]], takes: list[li
 def compare(place: DrawnPlace, episodes: Episodes) -> None:
     """Measure both on the same episodes, see that they agree, and print."""
     hearing = made_up_hearing(place)
-    simulator = Simulator(place, episodes, VAR, {"sound": hearing})
+    simulator = Simulator(place, episodes, VAR, SceneObservations({"sound": hearing}))
     walk(Greedy(), simulator)
     begin = time.perf_counter()
     walk(Greedy(), simulator)
@@ -184,7 +185,11 @@ def rows(places: list[DrawnPlace]) -> None:
             episodes = frozen_episodes(place, SOUNDS, VAR, seed=0)
             hearing = made_up_hearing(place)
             labels = Labels(name, "resonance")
-            frames.append(walk_room(agent, place, episodes, VAR, labels, {"sound": hearing}))
+            frames.append(
+                walk_room(
+                    agent, place, episodes, VAR, labels, SceneObservations({"sound": hearing})
+                )
+            )
         frame = pd.concat(frames)
         summarise(frame)
         seconds = time.perf_counter() - begin

@@ -17,6 +17,7 @@ from avn.dataset.source_locations import relative_locations
 from avn.mapping.memory_mapper import MemoryMapper
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import frozen_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
@@ -39,16 +40,20 @@ def flat() -> DrawnPlace:
     return draw("flat", FLAT)
 
 
-def simulator(place: DrawnPlace) -> Simulator:
-    """Six episodes in which the agent hears the very place of the source and sees true windows."""
+def simulator(place: DrawnPlace, heard: Tensor | None = None) -> Simulator:
+    """Six episodes in which the agent sees true windows.
+
+    It hears the very place of the source, unless `heard` says otherwise.
+    """
     lattice = torch.from_numpy(place.grid.lattice).long()
     sources = torch.from_numpy(np.asarray(place.sources)).long()
     where = relative_locations(lattice, sources)[:, :, None, None].expand(-1, -1, 1, TAKES, -1)
-    sights = {
+    visual = {
         "window": torch.from_numpy(window_cells(place.grid) >= 0).float(),
         "feature": torch.eye(4 * place.grid.cells),  # every state looks like itself alone
     }
-    return Simulator(place, frozen_episodes(place, ["ring"], VAR, 0), VAR, {"sound": where}, sights)
+    observed = SceneObservations({"sound": where if heard is None else heard}, visual)
+    return Simulator(place, frozen_episodes(place, ["ring"], VAR, 0), VAR, observed)
 
 
 def ours(explores: bool = False, localisation: str = "retrieval+odometry") -> PlannerAgent:

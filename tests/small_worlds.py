@@ -6,6 +6,7 @@ from contextlib import nullcontext
 import pytest
 import torch
 
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
@@ -36,23 +37,21 @@ def rules() -> Protocol:
 def random_tables(places, protocol, seed: int = 0, features: int = 8, sound: int = 6) -> Tables:
     """Tables with random features, other ones in every state and for every clip."""
     generator = torch.Generator().manual_seed(seed)
-    hearing, sights = [], []
+    observed = []
     for place in places:
         states, sources = 4 * len(place.grid.lattice), len(place.sources)
         heard = torch.randn(sources, states, 2, 3, sound, generator=generator)
-        hearing.append({"sound_feature": heard})
         window = torch.rand(states, 5, 5, generator=generator)
-        sights.append(
-            {"feature": torch.randn(states, features, generator=generator), "window": window}
-        )
-    return build_tables(places, protocol, hearing, sights)
+        visual = {"feature": torch.randn(states, features, generator=generator), "window": window}
+        observed.append(SceneObservations({"sound_feature": heard}, visual))
+    return build_tables(places, protocol, observed)
 
 
 def make_task(tables: Tables, protocol: Protocol, walks=None, **recipe) -> Task:
     """A task for a small network; `memory`, `width` and `maps` are of the network."""
     memory, width = recipe.pop("memory", 0), recipe.pop("width", 16)
     maps, inputs = recipe.pop("maps", 0), recipe.pop("inputs", ("feature", "sound_feature"))
-    both = {**tables.sights, **tables.hearing}
+    both = {**tables.visual, **tables.audio}
     features = {name: both[name].shape[-1] for name in inputs}
     shape = Shape(features, protocol.actions, width, memory, maps, map_width=11)
     # all that the tests count on is named here, whatever the defaults become

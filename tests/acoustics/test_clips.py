@@ -16,6 +16,7 @@ from avn.acoustics.clips import (
     export_wav,
 )
 from avn.acoustics.dry_sounds import BUILTIN, load_sounds
+from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 
 QUIET = MicrophoneConfig(noise_rms=0.0)
@@ -46,9 +47,9 @@ def delays(samples: list[int], taps: int = 9600) -> torch.Tensor:
 
 def same(renderer: ClipRenderer, brirs: torch.Tensor, **changed: int) -> torch.Tensor:
     """One and the same clip for every BRIR."""
-    words = {"source": 1, "state": 2, "sound": 0, "take": 3} | changed
+    words = {"source": 1, "state": 2, "sound": 0, "realisation": 3} | changed
     keys = {name: torch.full((len(brirs),), value) for name, value in words.items()}
-    return renderer.render(brir_spectra(brirs), **keys)
+    return renderer.render(brir_spectra(brirs), ClipId(**keys))
 
 
 def many(
@@ -58,7 +59,7 @@ def many(
     zeros = torch.zeros(count, dtype=torch.int64)
     spectra = brir_spectra(delays([0]) if brir is None else brir)
     takes = torch.arange(count)
-    return renderer.render(spectra, zeros, zeros, zeros + sound, takes, index=zeros)
+    return renderer.render(spectra, ClipId(zeros, zeros, zeros + sound, takes), index=zeros)
 
 
 @pytest.mark.parametrize("frequency", [440.0, 440.37])
@@ -142,20 +143,20 @@ def test_signal_to_noise_at_one_metre_is_between_30_and_40_db() -> None:
 
 
 def test_clips_are_the_same_bytes_again_and_in_any_batch(bank: DrySounds) -> None:
-    keys = [torch.tensor(values) for values in ([0, 1, 2], [5, 5, 6], [0, 1, 2], [0, 3, 1])]
+    keys = ClipId(*map(torch.tensor, ([0, 1, 2], [5, 5, 6], [0, 1, 2], [0, 3, 1])))
     brirs = torch.randn(3, 2, 800, generator=torch.Generator().manual_seed(0))
     renderer = ClipRenderer(bank, MicrophoneConfig(), 4, "train")
-    clips = renderer.render(brir_spectra(brirs), *keys)
-    again = ClipRenderer(bank, MicrophoneConfig(), 4, "train").render(brir_spectra(brirs), *keys)
+    clips = renderer.render(brir_spectra(brirs), keys)
+    again = ClipRenderer(bank, MicrophoneConfig(), 4, "train").render(brir_spectra(brirs), keys)
     assert torch.equal(clips, again)
     for row in range(3):
-        alone = renderer.render(brir_spectra(brirs[row : row + 1]), *(key[[row]] for key in keys))
+        alone = renderer.render(brir_spectra(brirs[[row]]), ClipId(*(key[[row]] for key in keys)))
         torch.testing.assert_close(alone[0], clips[row], atol=1e-3, rtol=1e-4)
-    shared = renderer.render(brir_spectra(brirs), *keys, index=torch.tensor([0, 1, 2]))
+    shared = renderer.render(brir_spectra(brirs), keys, index=torch.tensor([0, 1, 2]))
     assert torch.equal(shared, clips)
 
 
-@pytest.mark.parametrize("changed", ["source", "state", "take", "seed", "purpose"])
+@pytest.mark.parametrize("changed", ["source", "state", "realisation", "seed", "purpose"])
 def test_each_word_of_the_key_changes_the_clip(bank: DrySounds, changed: str) -> None:
     brir = delays([0])
     base = same(ClipRenderer(bank, QUIET, 0, "eval"), brir)

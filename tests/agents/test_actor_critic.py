@@ -8,6 +8,7 @@ from avn.agents.actor_critic import ActorCriticAgent
 from avn.agents.rollout import Labels, walk, walk_room
 from avn.core.errors import UserError
 from avn.navigation.episodes import frozen_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
@@ -40,13 +41,13 @@ def senses(place):
     feature = torch.nn.functional.normalize(torch.randn(states, 8, generator=generator), dim=1)
     window = torch.rand(states, 5, 5, generator=generator)
     heard = torch.randn(sources, states, 2, 3, 6, generator=generator)
-    return {"sound_feature": heard}, {"feature": feature, "window": window}
+    return SceneObservations({"sound_feature": heard}, {"feature": feature, "window": window})
 
 
 def records(agent, sounds=("one", "two"), rows=None):
     place = draw("flat", FLAT)
     episodes = frozen_episodes(place, sounds, RULES, seed=0)
-    return walk_room(agent, place, episodes, RULES, Labels("a3c", "resonance"), *senses(place))
+    return walk_room(agent, place, episodes, RULES, Labels("a3c", "resonance"), senses(place))
 
 
 @pytest.mark.parametrize("memory", [0, 5])
@@ -76,7 +77,7 @@ def test_it_wants_what_its_network_takes():
 
 def test_an_agent_with_memory_begins_with_what_its_walk_left_it():
     place = draw("flat", FLAT)
-    hearing, sights = senses(place)
+    observed = senses(place)
     episodes = frozen_episodes(place, ("one", "two"), RULES, seed=0)
     agent = make_agent(memory=5)
     begun = []
@@ -88,11 +89,11 @@ def test_an_agent_with_memory_begins_with_what_its_walk_left_it():
             return super().act(observation)
 
     agent.__class__ = Watching
-    walk(agent, Simulator(place, episodes, RULES, hearing, sights))
+    walk(agent, Simulator(place, episodes, RULES, observed))
     h, c = agent.network.no_memory(1)
     with torch.no_grad():
         for state in episodes.walks[0]:
-            seen = {"feature": sights["feature"][int(state)][None]}
+            seen = {"feature": observed.visual["feature"][int(state)][None]}
             _, h, c = agent.network.remember(agent.network.embed(seen), h, c)
     assert torch.allclose(begun[0], h.expand_as(begun[0]), atol=1e-5)
     assert np.all(episodes.walk == 0)

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 import torch
 from tensordict import TensorDict
-from torch import Tensor
 
 from avn.agents.greedy import Greedy
 from avn.agents.rollout import Labels, walk_room
 from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
 
@@ -24,7 +24,7 @@ def hearing(*locations: tuple[float, float]) -> TensorDict:
     return TensorDict({"sound": torch.tensor(locations).float()}, batch_size=[len(locations)])
 
 
-def true_hearing(place: DrawnPlace) -> Tensor:
+def true_hearing(place: DrawnPlace) -> SceneObservations:
     """The true location of each source, heard from each state, (K, S, 1, 1, 2)."""
     centres = place.grid.centres
     offset = centres[place.sources][:, None] - centres[None]
@@ -32,7 +32,7 @@ def true_hearing(place: DrawnPlace) -> Tensor:
     right = np.stack((east, -north, -east, north), axis=-1)
     front = np.stack((north, east, -north, -east), axis=-1)
     table = np.stack((right, front), axis=-1).reshape(len(place.sources), -1, 1, 1, 2)
-    return torch.from_numpy(table).float()
+    return SceneObservations({"sound": torch.from_numpy(table).float()})
 
 
 def test_turns_to_the_larger_part_and_walks(protocol: Protocol) -> None:
@@ -63,7 +63,7 @@ def test_with_true_hearing_it_arrives_in_an_empty_room(
     hall: DrawnPlace, protocol: Protocol
 ) -> None:
     episodes = exhaustive_episodes(hall, ["ring"], protocol, seed=0)
-    frame = walk_room(Greedy(), hall, episodes, protocol, LABELS, {"sound": true_hearing(hall)})
+    frame = walk_room(Greedy(), hall, episodes, protocol, LABELS, true_hearing(hall))
     assert (frame["collisions"] == 0).all()
     assert (frame["success"] == 1).all()
     assert (frame["spl"] == 1.0).all()
@@ -71,7 +71,7 @@ def test_with_true_hearing_it_arrives_in_an_empty_room(
 
 def test_it_is_blind_to_walls(flat: DrawnPlace, protocol: Protocol) -> None:
     episodes = exhaustive_episodes(flat, ["ring"], protocol, seed=0)
-    frame = walk_room(Greedy(), flat, episodes, protocol, LABELS, {"sound": true_hearing(flat)})
+    frame = walk_room(Greedy(), flat, episodes, protocol, LABELS, true_hearing(flat))
     near, far = frame["rooms_crossed"] == 0, frame["rooms_crossed"] > 0
     assert frame["success"][near].mean() > frame["success"][far].mean() + 0.2
     assert frame["collisions"][far].mean() > 1

@@ -14,6 +14,7 @@ from avn.dataset.source_locations import relative_locations
 from avn.mapping.memory_mapper import MemoryMapper
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 
@@ -65,12 +66,14 @@ def looks(place: DrawnPlace) -> Tensor:
 
 
 def run(agent: PlannerAgent, place: DrawnPlace, protocol: Protocol = VAR) -> pd.DataFrame:
-    sights = {"window": windows(place), "feature": looks(place)}
+    seen = {"window": windows(place), "feature": looks(place)}
     if agent.explores:
         episodes = frozen_episodes(place, ["ring"], protocol, seed=0)
     else:
         episodes = exhaustive_episodes(place, ["ring"], protocol, seed=0)
-    return walk_room(agent, place, episodes, protocol, LABELS, truth(place, protocol), sights)
+    return walk_room(
+        agent, place, episodes, protocol, LABELS, SceneObservations(truth(place, protocol), seen)
+    )
 
 
 @pytest.mark.parametrize("protocol", [VAR, STOP], ids=["var", "stop"])
@@ -103,7 +106,9 @@ def test_a_wall_that_it_cannot_see_is_found_by_running_into_it_once() -> None:
     blind = {"window": torch.full((4 * corridor.grid.cells, 5, 5), torch.nan)}
     episodes = exhaustive_episodes(corridor, ["ring"], VAR, seed=0)
     agent = PlannerAgent(OccupancyMapper(41))
-    frame = walk_room(agent, corridor, episodes, VAR, LABELS, truth(corridor), blind)
+    frame = walk_room(
+        agent, corridor, episodes, VAR, LABELS, SceneObservations(truth(corridor), blind)
+    )
     assert frame["success"].mean() > 0.8
     assert 0 < frame["collisions"].mean() < 3
 
@@ -115,8 +120,8 @@ def test_it_holds_to_a_source_that_it_hears_elsewhere_from_each_side() -> None:
     sound = torch.tensor([[0.0, -2.0]]).expand(1, 4 * 9, 1, 1, 2)
     episodes = exhaustive_episodes(hall, ["ring"], VAR, seed=0)
     agent = PlannerAgent(OccupancyMapper(41))
-    sights = {"window": windows(hall)}
-    frame = walk_room(agent, hall, episodes, VAR, LABELS, {"sound": sound}, sights)
+    observed = SceneObservations({"sound": sound}, {"window": windows(hall)})
+    frame = walk_room(agent, hall, episodes, VAR, LABELS, observed)
     assert frame["actions"].max() < 300
     assert frame["path"].min() > 0
 
@@ -137,18 +142,25 @@ def test_without_a_walk_a_memory_is_refused() -> None:
     place, agent = flat(), PlannerAgent(MemoryMapper(41))
     episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
     with pytest.raises(UserError, match="explores first, and these episodes have no exploration"):
-        walk_room(agent, place, episodes, VAR, LABELS, truth(place), {"feature": looks(place)})
+        walk_room(
+            agent,
+            place,
+            episodes,
+            VAR,
+            LABELS,
+            SceneObservations(truth(place), {"feature": looks(place)}),
+        )
 
 
-def test_a_missing_sense_is_named_with_what_makes_it() -> None:
+def test_a_missing_sense_is_named() -> None:
     place, agent = flat(), PlannerAgent(OccupancyMapper(41))
     episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
-    with pytest.raises(UserError, match="needs the observation 'window': choose what sees free"):
-        walk_room(agent, place, episodes, VAR, LABELS, truth(place))
-    sights, sound = {"window": windows(place)}, {"sound": truth(place)["sound"]}
-    with pytest.raises(UserError, match="needs the observation 'reach': choose what tells when"):
+    with pytest.raises(UserError, match="needs the observation 'window', which is not there"):
+        walk_room(agent, place, episodes, VAR, LABELS, SceneObservations(truth(place)))
+    observed = SceneObservations({"sound": truth(place)["sound"]}, {"window": windows(place)})
+    with pytest.raises(UserError, match="needs the observation 'reach', which is not there"):
         walk_room(
-            agent, place, exhaustive_episodes(place, ["ring"], STOP, 0), STOP, LABELS, sound, sights
+            agent, place, exhaustive_episodes(place, ["ring"], STOP, 0), STOP, LABELS, observed
         )
 
 

@@ -32,10 +32,9 @@ def test_a_trace_is_the_walk_that_the_records_tell_of() -> None:
 
 def test_the_takes_are_those_that_the_simulator_lets_hear() -> None:
     place = flat()
-    world = simulator(place)
     # what is heard tells which take it is
     takes = torch.arange(TAKES).float().expand(len(place.sources), 4 * place.grid.cells, 1, -1)
-    world._hear({"sound": torch.stack((takes, torch.zeros_like(takes)), dim=-1)})
+    world = simulator(place, torch.stack((takes, torch.zeros_like(takes)), dim=-1))
     told: list[Tensor] = []
 
     class Ears(RandomWalk):

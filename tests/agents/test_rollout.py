@@ -11,6 +11,7 @@ from avn.agents.random_walk import RandomWalk
 from avn.agents.rollout import Labels, records, walk, walk_room
 from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
@@ -124,9 +125,8 @@ def test_unprivileged_agents_get_observations_alone(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring"], protocols["stop"], seed=0)
-    simulator = Simulator(
-        two_rooms, episodes, protocols["stop"], {"sound": torch.rand(2, 204, 1, 1, 2)}
-    )
+    heard = SceneObservations({"sound": torch.rand(2, 204, 1, 1, 2)})
+    simulator = Simulator(two_rooms, episodes, protocols["stop"], heard)
     agent = Curious()
     walk(agent, simulator)
     assert set(vars(agent)) == {"given", "n", "generator", "protocol"}
@@ -162,8 +162,8 @@ def test_agents_do_not_know_the_numbers_of_states(
     hearing = 4 * torch.randn(2, 204, 1, 1, 2, generator=torch.Generator().manual_seed(0))
     episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
     moved = type(episodes)(**{**vars(episodes), "start": np.argsort(states)[episodes.start]})
-    first = Simulator(two_rooms, episodes, rules, {"sound": hearing})
-    second = Simulator(other, moved, rules, {"sound": hearing[:, states]})
+    first = Simulator(two_rooms, episodes, rules, SceneObservations({"sound": hearing}))
+    second = Simulator(other, moved, rules, SceneObservations({"sound": hearing[:, states]}))
     walk(agent, first)
     walk(agent, second)
     assert (torch.from_numpy(states)[second.state] == first.state).all()
@@ -177,5 +177,5 @@ def test_an_agent_without_what_it_needs_is_refused(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
-    with pytest.raises(UserError, match=r"needs the observation 'sound'.*sound_model"):
+    with pytest.raises(UserError, match="needs the observation 'sound', which is not there"):
         walk_room(Greedy(), two_rooms, episodes, protocols["var"], LABELS)

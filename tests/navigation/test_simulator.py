@@ -2,9 +2,9 @@ import dataclasses
 
 import pytest
 import torch
-from torch import Tensor
 
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
@@ -165,11 +165,17 @@ def test_observations_hold_nothing_else(
     silent = Simulator(two_rooms, episodes, protocols["var"])
     assert set(silent.reset().keys()) == {"collided", "odometry"}
     hearing = Simulator(
-        two_rooms, episodes, protocols["var"], {"sound": torch.zeros(2, 204, 1, 4, 2)}
+        two_rooms,
+        episodes,
+        protocols["var"],
+        SceneObservations({"sound": torch.zeros(2, 204, 1, 4, 2)}),
     )
     assert set(hearing.reset().keys()) == {"collided", "odometry", "sound"}
     seeing = Simulator(
-        two_rooms, episodes, protocols["var"], sights={"window": torch.zeros(204, 5, 5)}
+        two_rooms,
+        episodes,
+        protocols["var"],
+        SceneObservations(visual={"window": torch.zeros(204, 5, 5)}),
     )
     assert set(seeing.reset().keys()) == {"collided", "odometry", "window"}
 
@@ -179,12 +185,19 @@ def test_sights_are_those_of_the_state(
 ) -> None:
     episodes = exhaustive_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
     numbers = torch.arange(204)[:, None]
-    simulator = Simulator(two_rooms, episodes, protocols["var"], sights={"feature": numbers})
+    simulator = Simulator(
+        two_rooms, episodes, protocols["var"], SceneObservations(visual={"feature": numbers})
+    )
     assert (simulator.reset()["feature"][:, 0] == simulator.state).all()
     after = simulator.step(torch.full((len(episodes),), FORWARD))
     assert (after["feature"][:, 0] == simulator.state).all()
     with pytest.raises(ValueError, match="'feature' has 203 rows for 204 states"):
-        Simulator(two_rooms, episodes, protocols["var"], sights={"feature": numbers[1:]})
+        Simulator(
+            two_rooms,
+            episodes,
+            protocols["var"],
+            SceneObservations(visual={"feature": numbers[1:]}),
+        )
 
 
 def test_walks_are_seen_from_their_own_start(
@@ -193,7 +206,9 @@ def test_walks_are_seen_from_their_own_start(
     rules = dataclasses.replace(protocols["var"], exploration=30, starts=4)
     episodes = frozen_episodes(two_rooms, ["ring"], rules, 0, "own")
     numbers = torch.arange(204)[:, None]
-    simulator = Simulator(two_rooms, episodes, rules, sights={"feature": numbers})
+    simulator = Simulator(
+        two_rooms, episodes, rules, SceneObservations(visual={"feature": numbers})
+    )
     walks, walk = simulator.explored()
     assert walks.batch_size == (8, 31)
     assert walk.tolist() == list(range(8))
@@ -207,17 +222,17 @@ def test_walks_are_seen_from_their_own_start(
     assert "sound" not in set(walks.keys())
 
 
-def numbered_hearing(sounds: int, takes: int) -> Tensor:
+def numbered(sounds: int, realisations: int) -> SceneObservations:
     """Hearing whose features are the very indices, for two sources and 204 states."""
-    axes = (torch.arange(size) for size in (2, 204, sounds, takes))
-    return torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1)
+    axes = (torch.arange(size) for size in (2, 204, sounds, realisations))
+    return SceneObservations({"sound": torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1)})
 
 
 def test_hearing_is_of_the_source_the_state_and_the_sound(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = exhaustive_episodes(two_rooms, ["ring", "alarm"], protocols["var"], seed=0)
-    simulator = Simulator(two_rooms, episodes, protocols["var"], {"sound": numbered_hearing(2, 4)})
+    simulator = Simulator(two_rooms, episodes, protocols["var"], numbered(2, 4))
     actions = torch.randint(4, (30, len(episodes)), generator=torch.Generator().manual_seed(0))
     takes = []
     for action in actions:
@@ -236,7 +251,7 @@ def test_takes_do_not_depend_on_who_else_is_in_the_batch(
     rules = protocols["stop"]
     every = exhaustive_episodes(two_rooms, ["ring"], rules, seed=0)
     some = torch.arange(0, len(every), 7)
-    hearing = {"sound": numbered_hearing(1, 4)}
+    hearing = numbered(1, 4)
     whole = Simulator(two_rooms, every, rules, hearing)
     part = Simulator(two_rooms, pick(every, some.numpy()), rules, hearing)
     assert (whole.reset()["sound"][some] == part.reset()["sound"]).all()
@@ -279,5 +294,5 @@ def test_hearing_of_another_apartment_is_refused(
     corridor: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
-    with pytest.raises(ValueError, match="hearing 'sound' has shape"):
-        Simulator(corridor, episodes, protocols["var"], {"sound": numbered_hearing(1, 1)})
+    with pytest.raises(ValueError, match="audio 'sound' has shape"):
+        Simulator(corridor, episodes, protocols["var"], numbered(1, 1))

@@ -10,13 +10,20 @@ from avn.navigation.simulator import Simulator
 from avn.navigation.starts import build_starts
 from avn.navigation.world import World
 
-STOP_RULES = Protocol("stop", "radius", True, "walked")
+PROTOCOLS = {
+    "var": Protocol("var", "box", False, "attempted", moves_factor=2.0),
+    "var_stop": Protocol("var_stop", "box", True, "attempted", moves_factor=2.0),
+    "stop": Protocol("stop", "radius", True, "walked"),
+    # caps that episodes run into within the steps of the test
+    "short": Protocol("short", "box", False, "walked", max_actions=9),
+    "half": Protocol("half", "radius", False, "attempted", radius=0.5, moves_factor=1.3),
+}
 SECOND = "aaaa\naBaa\naaaA\naa.a"
 
 
-@pytest.mark.parametrize("says_stop", [False, True])
-def test_the_world_moves_and_ends_as_the_simulator_does(flat, rules, says_stop):
-    protocol = STOP_RULES if says_stop else rules
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_the_world_moves_and_ends_as_the_simulator_does(flat, name):
+    protocol = PROTOCOLS[name]
     places = [draw("second", SECOND), flat]  # the second place's numbers are shifted
     tables = random_tables(places, protocol)
     world = World(tables, build_starts(tables), 200, protocol, seed=3)
@@ -48,6 +55,7 @@ def test_the_world_moves_and_ends_as_the_simulator_does(flat, rules, says_stop):
         assert torch.equal(world.odometry()[here][running], observation["odometry"][running])
         success = (reward[here] == 10.0) & running
         assert torch.equal(success, simulator.success & running)
+    assert (simulator.done & ~simulator.success).any()  # some stopped elsewhere or ran out
 
 
 def test_rewards_are_ten_for_success_and_a_tenth_off_for_a_collision(rules):
@@ -106,7 +114,7 @@ def test_the_clip_that_is_heard_is_that_of_source_state_sound_and_take(flat, rul
         hearing.append(torch.randn(sources, states, 2, 3, 6, generator=generator))
         torch.rand(states, 5, 5, generator=generator)
         torch.randn(states, 8, generator=generator)
-    heard = tables.hearing["sound_feature"][world.clip()]
+    heard = tables.audio["sound_feature"][world.clip()]
     for row in range(64):
         room = int(tables.room[world.state[row]])
         source = int(world.source[row]) - int((tables.source_room < room).sum())

@@ -84,7 +84,7 @@ def test_a_policy_is_shown_features_and_never_a_number(flat, rules):
         assert set(shown.keys(include_nested=True, leaves_only=True)) == set(spy.in_keys)
         assert all(value.is_floating_point() for value in shown.values())
     numbers = env.rollout(1)["index"][:, 0]
-    expected = tables.sights["feature"][numbers["state"]]
+    expected = tables.visual["feature"][numbers["state"]]
     features = env.features(numbers["state"], numbers["clip"])
     assert torch.equal(features["feature"], expected)
 
@@ -122,7 +122,7 @@ def test_both_collectors_give_the_same_batches(flat, rules, memory, maps):
 
 def test_the_map_is_that_of_where_the_agent_has_been_and_begins_unknown(flat, rules):
     tables = random_tables([flat], rules)
-    tables.sights["window"][:] = torch.nan  # nothing is seen: only what it stands on and runs into
+    tables.visual["window"][:] = torch.nan  # nothing is seen: only what it stands on and runs into
     env = make_env(tables, rules, n=1, observes=("map",))
     east = 1
     env.world.state = env.world.start = torch.tensor([4 * 2 + east])

@@ -4,6 +4,7 @@ import torch
 from small_worlds import make_task, make_worker
 
 from avn.navigation.distances import fewest_actions
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
@@ -17,8 +18,9 @@ LEARN = {"episodes": 16, "steps": 10, "lr": 3e-3, "eps": 1e-5, "schedule": "cons
 def one_hot_tables(place, hearing=None):
     """Every state looks like no other."""
     states = 4 * len(place.grid.lattice)
-    heard = [] if hearing is None else [{"sound_feature": hearing}]
-    return build_tables([place], RULES, heard, [{"feature": torch.eye(states)}])
+    audio = {} if hearing is None else {"sound_feature": hearing}
+    observed = SceneObservations(audio, {"feature": torch.eye(states)})
+    return build_tables([place], RULES, [observed])
 
 
 def learned(task, updates):

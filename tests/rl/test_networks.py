@@ -94,7 +94,7 @@ def test_the_memory_after_a_walk_is_that_of_its_pictures_in_silence(flat, rules)
     worker = make_worker(make_task(tables, rules, walks=walks, memory=5))
     h, c = worker.network.no_memory(1)
     for state in walks[0, 1]:
-        seen = {"feature": tables.sights["feature"][state][None]}
+        seen = {"feature": tables.visual["feature"][state][None]}
         _, h, c = worker.network.remember(worker.network.embed(seen), h, c)
     assert torch.allclose(worker.explorations.h[1], h[0], atol=1e-6)
     assert torch.allclose(worker.explorations.c[1], c[0], atol=1e-6)

@@ -23,6 +23,7 @@ from torch.nn.functional import pad
 
 from avn.acoustics.counter_hash import absorb, integers
 from avn.acoustics.dry_sounds import RATE
+from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.files import written_whole
 
@@ -170,10 +171,7 @@ class ClipRenderer:
     def render(
         self,
         spectra: Tensor,
-        source: Tensor,
-        state: Tensor,
-        sound: Tensor,
-        take: Tensor,
+        clip: ClipId,
         index: Tensor | None = None,
     ) -> Tensor:
         """Render clips.
@@ -182,9 +180,9 @@ class ClipRenderer:
         ----------
         spectra : complex64 tensor, shape (N, 2, 8001)
             `brir_spectra` of each clip's BRIR; with ``index`` (M, 2, 8001), each used by many.
-        source, state, sound, take : int64 tensors, shape (N,)
-            Which clip it is. ``sound`` is an index into the bank's names; the others only enter
-            the draw.
+        clip : ClipId
+            Which clips. Their sound is an index into the bank's names; all else only enters the
+            draw.
         index : int64 tensor, shape (N,), optional
             Row of ``spectra`` for each clip.
 
@@ -193,7 +191,8 @@ class ClipRenderer:
         float32 tensor, shape (N, 2, 16000)
             Left and right ear. 16 to 128 clips a call are fastest on a CPU, for its caches.
         """
-        words = torch.stack([source, state, self.sounds.keys[sound], take], dim=-1)
+        sound = clip.sound
+        words = torch.stack(clip._replace(sound=self.sounds.keys[sound]), dim=-1)
         key = absorb(self._key, words.to(torch.int64))
         place, phase, left, right = (integers(key, draw) for draw in range(4))
         dry = torch.fft.rfft(self.sounds.seconds(sound, place, phase))

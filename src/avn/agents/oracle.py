@@ -7,7 +7,7 @@ from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
-from avn.core.actions import HEADINGS, MOVES, STOP
+from avn.core.actions import ACTIONS, HEADINGS, MOVES, STOP
 from avn.navigation.distances import fewest_actions
 from avn.navigation.simulator import Simulator
 
@@ -36,7 +36,8 @@ class Oracle(Agent):
     def act(self, observation: TensorDict) -> Tensor:
         """The action after which the fewest are left."""
         simulator = self._simulator
-        after = simulator.transitions[simulator.state][:, :STOP]
+        following = simulator.tables.following.unflatten(0, (-1, ACTIONS))
+        after = following[simulator.state, :STOP]
         spent = torch.zeros(STOP, dtype=torch.int64)
         spent[list(MOVES)] = 1
         left = (self._allowance - simulator.walked)[:, None] - spent

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,25 +19,10 @@ from avn.core.random import derive
 from avn.navigation.distances import fewest_actions
 from avn.navigation.episodes import Episodes
 from avn.navigation.metrics import sna, soft_spl, spl
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
-
-# What to do where an agent wants an observation that nobody makes.
-_MAKERS = {
-    "sound": "choose a sound model, such as sound_model=cnn5",
-    "reach": "choose what tells when to stop, such as stop_model=cnn5",
-    "window": "choose what sees free squares, such as occupancy_model=small",
-    "feature": "choose what knows places again, such as mapper=spatial_memory",
-    "sound_feature": "choose a sound model, such as sound_model=cnn5",
-}
-
-
-def missing_observation(agent: str, name: str) -> UserError:
-    """The error where an agent needs an observation that nothing makes."""
-    maker = _MAKERS.get(name, "choose another agent")
-    return UserError(f"agent {agent} needs the observation '{name}': {maker}")
-
 
 # What looks on at a walk: it is shown simulator and agent, what is observed, and the actions that
 # follow, which are None when all episodes are over; it says whether it has seen enough.
@@ -59,8 +44,7 @@ def walk_room(
     episodes: Episodes,
     protocol: Protocol,
     labels: Labels,
-    hearing: Mapping[str, Tensor] | None = None,
-    sights: Mapping[str, Tensor] | None = None,
+    observations: SceneObservations | None = None,
     watch: Watch | None = None,
 ) -> pd.DataFrame:
     """Let an agent walk all episodes of a room at once.
@@ -70,8 +54,8 @@ def walk_room(
 
     Parameters
     ----------
-    hearing, sights : mappings of str to tensor, optional
-        See `Simulator`.
+    observations : SceneObservations, optional
+        What can be heard and seen there.
     watch : callable, optional
         Looks on; see `Watch`. When it has seen enough the walk is broken off, and what the records
         say of episodes that still run is void.
@@ -86,7 +70,7 @@ def walk_room(
     UserError
         Where the agent needs an observation that is not there.
     """
-    simulator = Simulator(place, episodes, protocol, hearing, sights)
+    simulator = Simulator(place, episodes, protocol, observations)
     walk(agent, simulator, watch)
     return records(simulator, labels)
 
@@ -99,7 +83,10 @@ def walk(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> None
     """
     observation = simulator.reset()
     for key in sorted(set(agent.wants(simulator.protocol)) - set(observation.keys())):
-        raise missing_observation(type(agent).__name__, key)
+        raise UserError(
+            f"agent {type(agent).__name__} needs the observation '{key}', which is not there; "
+            f"there are {', '.join(sorted(observation.keys()))}"
+        )
     episodes = simulator.episodes
     generator = torch.Generator().manual_seed(derive("agent", episodes.seed, episodes.room) >> 1)
     agent.reset(len(simulator), generator, simulator.protocol)

@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
+from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.prefetch import AheadLoader
 from avn.dataset.scene import AudibleScene, Brirs, Scene
@@ -114,7 +115,7 @@ class ClipSet(Dataset[ClipBatch]):
         spectra = brir_spectra(self._brirs(pair))
         source, state = self.source[pair][index], self.state[pair][index]
         return ClipBatch(
-            clips=self.renderer.render(spectra, source, state, sound, take, index),
+            clips=self.renderer.render(spectra, ClipId(source, state, sound, take), index),
             target=self.target[pair][index],
             in_sight=self.in_sight[pair][index],
             sound=sound,

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from omegaconf import MISSING
+from torch import Tensor
 
 from avn.apartments.floor_plan import CELL
 from avn.apartments.grid import Grid, goal_cells
@@ -107,3 +109,31 @@ class Protocol:
             return grid.distances[sources].astype(np.int64) * CELL <= self.radius + 1e-9
         near: NDArray[np.bool_] = goal_cells(grid)[sources]
         return near
+
+    def judged(self, action: Tensor, arrived: Tensor) -> tuple[Tensor, Tensor]:
+        """Whether an action ends the episode by itself, and whether the agent succeeds with it.
+
+        Parameters
+        ----------
+        action : (N,) int64
+        arrived : (N,) bool
+            Whether it is at the goal after the action.
+
+        Returns
+        -------
+        success, over : (N,) bool
+        """
+        if not self.says_stop:
+            return arrived, arrived
+        stopped = action == STOP
+        return arrived & stopped, stopped
+
+    def most_moves(self, moves: Tensor) -> Tensor:
+        """Attempted moves that end an episode whose shortest walk to the source has `moves`."""
+        if self.moves_factor is None:
+            return torch.full_like(moves, self.max_actions + 1, dtype=torch.int64)
+        return torch.ceil(self.moves_factor * moves.double()).long()
+
+    def out_of_time(self, actions: Tensor, attempted: Tensor, most_moves: Tensor) -> Tensor:
+        """Which episodes end since actions or attempted moves have been used up, (N,) bool."""
+        return (actions >= self.max_actions) | (attempted >= most_moves)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
-from avn.core.actions import HEADINGS, transitions
+from avn.core.actions import ACTIONS, BACKWARD, HEADINGS, transitions
+from avn.core.clip_id import ClipId
 from avn.navigation.distances import measure
+from avn.navigation.observations import SceneObservations
 from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
-from avn.navigation.simulator import positions
+
+# Unit vectors (east, north) to the right and to the front of headings north, east, south, west.
+_RIGHT = np.array([(1, 0), (0, -1), (-1, 0), (0, 1)])
+_FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 
 @dataclass(frozen=True)
@@ -38,12 +44,13 @@ class Tables:
     moves : (...,) int64
         Moves to the source's cell, as `goal` is laid out.
     clip_row : (Q,) int64
-        `clip_row[source] + state * clips_of_state + sound * takes + take` is the row of a clip.
-    sounds, takes : int
+        Where the clips of each source begin; see `clip`.
+    sounds, realisations : int
+        How many there are of each clip.
     places : (4 * S, 3) int64
-        See `avn.navigation.simulator.positions`.
-    hearing : dict of str to (clips, ...) tensor
-    sights : dict of str to (S, ...) tensor
+        See `positions`.
+    audio : dict of str to (clips, ...) tensor
+    visual : dict of str to (S, ...) tensor
     """
 
     following: Tensor
@@ -55,10 +62,10 @@ class Tables:
     moves: Tensor
     clip_row: Tensor
     sounds: int
-    takes: int
+    realisations: int
     places: Tensor
-    hearing: dict[str, Tensor]
-    sights: dict[str, Tensor]
+    audio: dict[str, Tensor]
+    visual: dict[str, Tensor]
 
     @property
     def states(self) -> int:
@@ -68,12 +75,29 @@ class Tables:
     @property
     def clips_of_state(self) -> int:
         """Clips of one source in one state."""
-        return self.sounds * self.takes
+        return self.sounds * self.realisations
 
     @property
     def clips(self) -> int:
         """Clips of all sources in all states."""
         return len(self.goal) * self.clips_of_state
+
+    def clip(self, clip: ClipId) -> Tensor:
+        """The rows of clips in the tensors of `audio`, (N,) int64."""
+        first = self.clip_row[clip.source] + clip.state * self.clips_of_state
+        return first + clip.sound * self.realisations + clip.realisation
+
+    def odometry(self, start: Tensor, state: Tensor) -> Tensor:
+        """How states lie as seen from starts, which broadcast against them.
+
+        Returns
+        -------
+        (..., 3) int64
+            Cells to the right and to the front and quarter turns clockwise, in the frame of the
+            start.
+        """
+        frame = start % HEADINGS * self.states
+        return self.places[frame + state] - self.places[frame + start]
 
     def share(self) -> Tables:
         """Move all tensors to shared memory; returns itself."""
@@ -84,11 +108,37 @@ class Tables:
         return self
 
 
+def advance(
+    tables: Tables, source: Tensor, state: Tensor, action: Tensor
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Move N agents by one action: the one rule of motion, for evaluation and for training.
+
+    Parameters
+    ----------
+    tables : Tables
+    source, state : (N,) int64
+        What each agent seeks, and where it is.
+    action : (N,) int64
+        See `avn.core.actions`.
+
+    Returns
+    -------
+    state : (N,) int64
+        Where each is now; a blocked move leads back to where it began.
+    blocked : (N,) bool
+        Whether a move was tried and could not be made.
+    arrived : (N,) bool
+        Whether it is now at the goal, whatever it did.
+    """
+    following = tables.following[state * ACTIONS + action]
+    blocked = (action <= BACKWARD) & (following == state)
+    return following, blocked, tables.goal[tables.goal_row[source] + following]
+
+
 def build_tables(
     places: Sequence[Place],
     protocol: Protocol,
-    hearing: Sequence[Mapping[str, Tensor]] = (),
-    sights: Sequence[Mapping[str, Tensor]] = (),
+    observations: Sequence[SceneObservations] = (),
     sounds: int = 1,
 ) -> Tables:
     """Lay out apartments.
@@ -98,18 +148,16 @@ def build_tables(
     places : sequence of Place
     protocol : Protocol
         Where agents succeed.
-    hearing : sequence of mapping of str to (K, S, sounds, takes, ...) tensor
-        What is heard in each apartment, by name, as for `Simulator`.
-    sights : sequence of mapping of str to (S, ...) tensor
-        What is seen in each apartment, by name.
+    observations : sequence of SceneObservations, optional
+        What can be observed in each apartment, the same in all.
     sounds : int
         How many sounds there are where nothing is heard.
     """
-    hearing, sights = [*hearing] or [{}] * len(places), [*sights] or [{}] * len(places)
+    observed = [*observations] or [SceneObservations()] * len(places)
     states = np.cumsum([0] + [HEADINGS * len(place.grid.lattice) for place in places])
-    heard = {name: _laid_flat([own[name] for own in hearing]) for name in hearing[0]}
-    first = next(iter(hearing[0].values()), None)
-    takes = 1 if first is None else first.shape[3]
+    sounds, realisations = observed[0].sounds or sounds, observed[0].realisations
+    for place, own, count in zip(places, observed, np.diff(states), strict=True):
+        own.check(len(place.sources), int(count), sounds)
     distances = [measure(place, protocol) for place in places]
     sources = [len(place.sources) for place in places]
     offsets = torch.from_numpy(states[:-1])
@@ -117,7 +165,6 @@ def build_tables(
     # the rows of all sources of an apartment, then those of the next
     own_states = torch.from_numpy(np.diff(states))[source_room]
     row = torch.cumsum(own_states, 0) - own_states - offsets[source_room]
-    sounds = sounds if first is None else first.shape[2]
     return Tables(
         following=_laid_out([transitions(p.grid.neighbours) for p in places], offsets),
         room=torch.from_numpy(np.repeat(np.arange(len(places)), np.diff(states))),
@@ -126,17 +173,22 @@ def build_tables(
         goal=_by_state([d.goal for d in distances]),
         goal_row=row,
         moves=_by_state([d.source_moves for d in distances]),
-        clip_row=row * sounds * takes,
+        clip_row=row * sounds * realisations,
         sounds=sounds,
-        takes=takes,
+        realisations=realisations,
         places=_places(places),
-        hearing=heard,
-        sights={name: torch.cat([own[name] for own in sights]) for name in sights[0]},
+        audio={
+            name: _joined([own.audio[name].flatten(0, 3) for own in observed])
+            for name in observed[0].audio
+        },
+        visual={
+            name: _joined([own.visual[name] for own in observed]) for name in observed[0].visual
+        },
     )
 
 
-def _laid_flat(heard: Sequence[Tensor]) -> Tensor:
-    return torch.cat([own.flatten(0, 3) for own in heard])
+def _joined(tensors: Sequence[Tensor]) -> Tensor:
+    return tensors[0] if len(tensors) == 1 else torch.cat([*tensors])  # one needs no copy
 
 
 def _laid_out(tables: Sequence[np.ndarray], offsets: Tensor) -> Tensor:
@@ -152,3 +204,16 @@ def _by_state(tables: Sequence[np.ndarray]) -> Tensor:
 def _places(places: Sequence[Place]) -> Tensor:
     each = [positions(p.grid.lattice).unflatten(0, (HEADINGS, -1)) for p in places]
     return torch.cat(each, dim=1).flatten(0, 1)
+
+
+def positions(lattice: NDArray[np.int32]) -> Tensor:
+    """Where a state lies as an agent sees it that faces each heading, (4 x 4 C, 3) int64.
+
+    By heading of the beholder and state: cells to the right and to the front from the lattice's
+    origin, and quarter turns clockwise from the beholder's heading.
+    """
+    axes = np.stack((_RIGHT, _FRONT), axis=1)
+    place = np.repeat(lattice @ axes.transpose(0, 2, 1), HEADINGS, axis=1)
+    turn = (np.arange(HEADINGS)[None, :] - np.arange(HEADINGS)[:, None]) % HEADINGS
+    turns = np.tile(turn, (1, len(lattice)))[:, :, None]
+    return torch.from_numpy(np.concatenate((place, turns), axis=2).reshape(-1, 3).astype(np.int64))

@@ -7,11 +7,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from avn.core.actions import ACTIONS, BACKWARD, HEADINGS, STOP
+from avn.core.actions import BACKWARD
+from avn.core.clip_id import ClipId
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
 from avn.navigation.starts import Starts
-from avn.navigation.tables import Tables
+from avn.navigation.tables import Tables, advance
 
 _KEPT = ("state", "start", "source", "walk", "sound", "take", "actions", "attempted", "collided")
 
@@ -95,18 +96,11 @@ class World:
         terminated, truncated : (N,) bool
             Whether the episode ended by itself, or was cut off.
         """
-        following = self.tables.following[self.state * ACTIONS + actions]
-        moving = actions <= BACKWARD
-        self.collided = moving & (following == self.state)
-        self.state = following
+        found = advance(self.tables, self.source, self.state, actions)
+        self.state, self.collided, arrived = found
         self.actions = self.actions + 1
-        self.attempted = self.attempted + moving
-        arrived = self.tables.goal[self.tables.goal_row[self.source] + following]
-        if self.protocol.says_stop:
-            terminated = actions == STOP
-            success = arrived & terminated
-        else:
-            terminated = success = arrived
+        self.attempted = self.attempted + (actions <= BACKWARD)
+        success, terminated = self.protocol.judged(actions, arrived)
         self._draw_takes()
         truncated = self._out_of_time() & ~terminated
         reward = torch.where(self.collided, self.reward.collision, self.reward.step)
@@ -114,14 +108,11 @@ class World:
 
     def clip(self) -> Tensor:
         """The row of the clip that each agent hears now, (N,) int64."""
-        tables = self.tables
-        clip = tables.clip_row[self.source] + self.state * tables.clips_of_state
-        return clip + self.sound * tables.takes + self.take
+        return self.tables.clip(ClipId(self.source, self.state, self.sound, self.take))
 
     def odometry(self) -> Tensor:
         """Cells to the right and to the front and quarter turns since the start, (N, 3) int64."""
-        frame = self.start % HEADINGS * self.tables.states
-        return self.tables.places[frame + self.state] - self.tables.places[frame + self.start]
+        return self.tables.odometry(self.start, self.state)
 
     def state_dict(self) -> dict[str, Any]:
         """All that goes on changing."""
@@ -136,16 +127,14 @@ class World:
 
     def _draw_takes(self, rows: Tensor | None = None) -> None:
         """Let every agent, or those of some rows, hear another take."""
-        if self.tables.takes > 1:
-            takes = torch.randint(self.tables.takes, (self.n,), generator=self.generator)
+        if self.tables.realisations > 1:
+            takes = torch.randint(self.tables.realisations, (self.n,), generator=self.generator)
             self.take = takes if rows is None else torch.where(rows, takes, self.take)
 
     def _out_of_time(self) -> Tensor:
         """Whose episodes are cut off after this action, (N,) bool."""
         if self.max_steps is not None:
             return self.actions >= self.max_steps
-        out = self.actions >= self.protocol.max_actions
-        if self.protocol.moves_factor is None:
-            return out
         moves = self.tables.moves[self.tables.goal_row[self.source] + self.start]
-        return out | (self.attempted >= torch.ceil(self.protocol.moves_factor * moves))
+        most = self.protocol.most_moves(moves)
+        return self.protocol.out_of_time(self.actions, self.attempted, most)

@@ -15,6 +15,7 @@ from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
+from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.prefetch import made_ahead, threads_for_one_operation
 from avn.core.progress import progress_bar
@@ -191,8 +192,9 @@ def hear(
         # Whole pairs, so that an impulse response is transformed once for all its clips.
         spectra = brir_spectra(brirs.gather(source[rows], state[rows]))
         index = torch.arange(len(rows)).repeat_interleave(each)
-        which = (source[rows][index], state[rows][index], sound.repeat(len(rows)))
-        clips = renderer.render(spectra, *which, take.repeat(len(rows)), index)
+        repeated = sound.repeat(len(rows)), take.repeat(len(rows))
+        clip = ClipId(source[rows][index], state[rows][index], *repeated)
+        clips = renderer.render(spectra, clip, index)
         return (answer or model)(clips.to(model.device)).cpu()
 
     threads, parts = torch.get_num_threads(), torch.arange(len(source)).split(max(1, BATCH // each))

@@ -9,6 +9,7 @@ import torch
 from omegaconf import DictConfig
 
 from avn.acoustics.clips import ClipRenderer, brir_spectra, export_wav
+from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.progress import tell
 from avn.core.settings import leaves, typed
@@ -109,7 +110,7 @@ def _export(cfg: DictConfig, chosen: list[AudibleScene]) -> None:
         spectra = brir_spectra(which.brirs.gather(source, state))
         for index, name in enumerate(sounds.names):
             sound = torch.full_like(source, index)
-            clips = render.render(spectra, source, state, sound, torch.zeros_like(source))
+            clips = render.render(spectra, ClipId(source, state, sound, torch.zeros_like(source)))
             for (k, s), clip in zip(pairs, clips, strict=True):
                 file = f"{name}-{cfg.acoustics.name}-source{k}-state{s}.wav"
                 export_wav(which.folder / "wav" / file, clip)

@@ -10,20 +10,23 @@ import torch
 from omegaconf import DictConfig
 from torch import Tensor
 
-from avn.agents.rollout import missing_observation
+from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.dataset.scene import Scene
 from avn.dataset.source_locations import where_sources_are
+from avn.navigation.observations import SceneObservations
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.occupancy import LocalPatches, sees_windows, true_windows
 from avn.pipeline.sound_network import SourceEstimates, hears
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import Stage
 from avn.pipeline.stop_classifier import StopProbabilities, can_stop
 from avn.pipeline.views import RenderedViews
 from avn.pipeline.visual_features import VisualEmbeddings
+
+# What every agent observes without any stage.
+OWN = ("collided", "odometry")
 
 
 @dataclass(frozen=True)
@@ -32,14 +35,18 @@ class Observation:
 
     Attributes
     ----------
+    shape : str
+        What one observation of one agent is.
     audio : bool
-        Whether it is of clips, (K, S, sounds, takes, ...), or of states, (S, ...).
+        Whether it is of clips, (K, S, sounds, realisations, ...), or of states, (S, ...).
     stage : callable
         Config, apartments and clips to the stage that makes it.
     load : callable
         That stage to a tensor for each apartment.
     there : callable
         Whether a config has what makes it.
+    hint : str
+        What to do where it has not.
     truth : str, optional
         The part of `agent.truth` that stands in for it.
     true : callable, optional
@@ -50,10 +57,12 @@ class Observation:
         Keys of the config that shape the truth.
     """
 
+    shape: str
     audio: bool
     stage: Callable[[DictConfig, Apartments, Clips], Any]
     load: Callable[[Any], list[Tensor]]
     there: Callable[[DictConfig], bool] = lambda cfg: True
+    hint: str = ""
     truth: str | None = None
     true: Callable[[Apartments, Sequence[Scene]], list[Tensor]] | None = None
     settings: tuple[str, ...] = ()
@@ -77,6 +86,8 @@ def _true_patches(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tenso
 
 OBSERVATIONS = {
     "sound": Observation(
+        shape="(2,): where the source is heard, metres right and front",
+        hint="choose a sound model, such as sound_model=cnn5",
         audio=True,
         stage=SourceEstimates,
         load=SourceEstimates.load,
@@ -86,18 +97,23 @@ OBSERVATIONS = {
         true_settings=("takes",),
     ),
     "reach": Observation(
+        shape="(): probability that the source is within reach",
+        hint="choose what tells when to stop, such as stop_model=cnn5",
         audio=True,
         stage=StopProbabilities,
         load=StopProbabilities.load,
         there=can_stop,
     ),
     "sound_feature": Observation(
+        shape="(D,): last layer of the sound network",
+        hint="choose a sound model, such as sound_model=cnn5",
         audio=True,
         stage=AudioEmbeddings,
         load=AudioEmbeddings.load,
         there=hears,
     ),
     "view": Observation(
+        shape="(3, H, W): uint8 picture",
         audio=False,
         stage=lambda cfg, apartments, clips: RenderedViews(cfg, apartments),
         load=lambda stage: [
@@ -105,16 +121,20 @@ OBSERVATIONS = {
         ],
     ),
     "depth": Observation(
+        shape="(H, W): metres",
         audio=False,
         stage=lambda cfg, apartments, clips: RenderedViews(cfg, apartments),
         load=lambda stage: [torch.from_numpy(views.depth[:]) for views in stage.load()],
     ),
     "feature": Observation(
+        shape="(D,): last layer of the backbone, of length 1",
         audio=False,
         stage=lambda cfg, apartments, clips: VisualEmbeddings(cfg, apartments),
         load=VisualEmbeddings.load,
     ),
     "window": Observation(
+        shape="(5, 5): probability that cells ahead are free; NaN where none can tell",
+        hint="choose what sees free squares, such as occupancy_model=small",
         audio=False,
         stage=lambda cfg, apartments, clips: LocalPatches(cfg, apartments),
         load=LocalPatches.trusted,
@@ -156,14 +176,26 @@ class Observed:
         """Whether an observation is the truth."""
         return OBSERVATIONS[name].truth in self._truth
 
-    def check(self, agent: str) -> None:
-        """Raise `UserError` where the config has nothing that makes an observation."""
-        for name in self.names:
-            if not self.is_true(name) and not OBSERVATIONS[name].there(self.cfg):
-                raise missing_observation(agent, name)
+    def check(self, agent: str, wanted: Sequence[str]) -> None:
+        """Refuse observations that do not exist, or that the config has nothing for.
+
+        Parameters
+        ----------
+        agent : str
+            Who needs them, for the message.
+        wanted : sequence of str
+        """
+        for name in wanted:
+            start = f"agent {agent} needs the observation '{name}'"
+            if name not in (*OBSERVATIONS, *OWN):
+                raise UserError(f"{start}; there are {', '.join((*OBSERVATIONS, *OWN))}")
+            if name in self.names and not self.is_true(name):
+                own = OBSERVATIONS[name]
+                if not own.there(self.cfg):
+                    raise UserError(f"{start}: {own.hint}")
 
     @property
-    def stages(self) -> dict[str, Stage]:
+    def stages(self) -> dict[str, Any]:
         """The stage of each observation that is not the truth and that the config can make."""
         return {
             name: OBSERVATIONS[name].stage(self.cfg, self.apartments, self.clips)
@@ -181,21 +213,15 @@ class Observed:
         ]
         return tuple(dict.fromkeys(key for own in keys for key in own))
 
-    def load(self, scenes: Sequence[Scene]) -> tuple[list[Any], list[Any]]:
+    def load(self, scenes: Sequence[Scene]) -> list[SceneObservations]:
         """Read all observations.
 
         Parameters
         ----------
         scenes : sequence of Scene
             Of the apartments.
-
-        Returns
-        -------
-        heard, seen : lists of dicts of str to tensor
-            For each apartment, by name.
         """
-        heard: list[dict[str, Tensor]] = [{} for _ in scenes]
-        seen: list[dict[str, Tensor]] = [{} for _ in scenes]
+        observed: list[tuple[dict[str, Tensor], dict[str, Tensor]]] = [({}, {}) for _ in scenes]
         stages = self.stages
         for name in self.names:
             own = OBSERVATIONS[name]
@@ -203,6 +229,6 @@ class Observed:
                 tensors = own.true(self.apartments, scenes)
             else:
                 tensors = own.load(stages[name])
-            for room, tensor in zip(heard if own.audio else seen, tensors, strict=True):
-                room[name] = tensor
-        return heard, seen
+            for (audio, visual), tensor in zip(observed, tensors, strict=True):
+                (audio if own.audio else visual)[name] = tensor
+        return [SceneObservations(*both) for both in observed]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from avn.acoustics.clips import CLIP_SAMPLES, FADE_SAMPLES, ClipRenderer, brir_spectra
+from avn.core.clip_id import ClipId
 from avn.core.settings import typed
 from avn.navigation.trace import Trace
 from avn.pipeline.apartments import Apartments
@@ -59,7 +60,7 @@ class Perceived:
             source = torch.full_like(states, trace.source)
             sound = torch.full_like(states, trace.sound)
             spectra = brir_spectra(brirs.gather(source, states))
-            parts.append(self._renderer.render(spectra, source, states, sound, takes))
+            parts.append(self._renderer.render(spectra, ClipId(source, states, sound, takes)))
         return torch.cat(parts)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from torch import Tensor
 from avn.core.settings import typed
 from avn.dataset.scene import Scene
 from avn.mapping.place_errors import place_errors
+from avn.navigation.observations import SceneObservations
 from avn.pipeline.audio_inference import sound_errors
 from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork, window_errors
@@ -34,8 +35,7 @@ def write(
     observed: Observed,
     rooms: Sequence[Scene],
     walks: Sequence[NDArray[np.int64]],
-    hearing: Sequence[Mapping[str, Tensor]],
-    sights: Sequence[Mapping[str, Tensor]],
+    observations: Sequence[SceneObservations],
     folder: Path,
 ) -> None:
     """Write a table for each thing that a network tells the agent of the rooms.
@@ -47,12 +47,12 @@ def write(
     rooms : sequence of Scene
     walks : sequence of (W, T) int64
         Exploration walks in each room, as states.
-    hearing, sights : sequences of mappings of str to tensor
-        What is heard and seen in each room; see `avn.pipeline.observations`.
+    observations : sequence of SceneObservations
+        What is heard and seen in each room.
     """
     cfg, stages = observed.cfg, observed.stages
     if "sound" in stages:
-        heard = [own["sound"] for own in hearing]
+        heard = [own.audio["sound"] for own in observations]
         results.write_csv(_heard(cfg, rooms, heard), folder / HEARD)
     if "window" in stages:
         estimates = [own[:, 0] for own in stages["window"].load()]
@@ -60,7 +60,7 @@ def write(
         seen = window_errors(rooms, typed(cfg.renderer.camera), estimates, prior)
         results.write_csv(seen, folder / SEEN)
     if "feature" in stages and "top" in cfg.mapper:
-        features = [own["feature"] for own in sights]
+        features = [own.visual["feature"] for own in observations]
         results.write_csv(_places(cfg, rooms, walks, features), folder / PLACES)
 
 

@@ -20,6 +20,7 @@ from avn.core.files import check_name
 from avn.core.settings import plain, typed
 from avn.dataset.scene import Scene
 from avn.navigation.episodes import frozen_episodes
+from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
 from avn.navigation.tables import Tables, build_tables
@@ -157,17 +158,17 @@ def part_stages(cfg: DictConfig, part: str) -> list[Stage]:
     return [geometry, *observed(cfg, part).stages.values()]
 
 
-def load_part(cfg: DictConfig, part: str) -> tuple[list[Scene], list[Any], list[Any]]:
-    """Scenes of a part of the training world, with what is heard and what is seen in each."""
+def load_part(cfg: DictConfig, part: str) -> tuple[list[Scene], list[SceneObservations]]:
+    """Scenes of a part of the training world, with what is observed in each."""
     scenes = Geometry(cfg, Apartments(cfg, part, TRAINING)).load()
-    return (scenes, *observed(cfg, part).load(scenes))
+    return scenes, observed(cfg, part).load(scenes)
 
 
-def tables_of(cfg: DictConfig, opened: tuple[list[Scene], list[Any], list[Any]]) -> Tables:
+def tables_of(cfg: DictConfig, opened: tuple[list[Scene], list[SceneObservations]]) -> Tables:
     """The apartments of `load_part` as tables, under the protocol of the config."""
-    rooms, hearing, sights = opened
+    rooms, observations = opened
     sounds = len(sound_files(cfg, TRAINING))
-    return build_tables(rooms, instantiate(cfg.protocol), hearing, sights, sounds)
+    return build_tables(rooms, instantiate(cfg.protocol), observations, sounds)
 
 
 def _shape(cfg: DictConfig, features: dict[str, int]) -> Shape:
@@ -193,7 +194,7 @@ def _train(policy: Policy) -> None:
     torch.manual_seed(recipe.train_seed)
     network = ActorCritic(shape)
     for name in features:
-        table = tables.sights.get(name, tables.hearing.get(name))
+        table = tables.visual.get(name, tables.audio.get(name))
         assert table is not None
         network.standardise(name, table[:: max(1, len(table) // _EXAMPLES)])
     protocol: Protocol = instantiate(cfg.protocol)
@@ -219,7 +220,7 @@ def _train(policy: Policy) -> None:
 
 def _sizes(tables: Tables) -> dict[str, int]:
     """Sizes of what a network takes as features, by name."""
-    both = {**tables.sights, **tables.hearing}
+    both = {**tables.visual, **tables.audio}
     return {
         name: int(both[name].shape[-1]) for name in ("feature", "sound_feature") if name in both
     }
@@ -254,11 +255,11 @@ class Measure:
         given, options = parts(self._cfg), plain(self._cfg, "baseline")
         options.pop("_target_")
         agent = ActorCriticAgent(network, **options, **given)
-        for part, (rooms, hearing, sights) in self._observed.items():
+        for part, (rooms, observations) in self._observed.items():
             name = "training" if part == "train" else part
             walked = pd.concat(
-                walk_room(agent, room, self._episodes(room), self._protocol, self._labels, *senses)
-                for room, *senses in zip(rooms, hearing, sights, strict=True)
+                walk_room(agent, room, self._episodes(room), self._protocol, self._labels, own)
+                for room, own in zip(rooms, observations, strict=True)
             )
             found[f"{name}/return"] = float(_returns(walked, self._cfg.a3c.reward).mean())
             found[f"{name}/success"] = float(walked["success"].mean())

@@ -231,12 +231,11 @@ def _walk(
     evaluation = Evaluation(cfg)
     for need in evaluation.needs():
         build(need)
-    hearing, sights = evaluation.observed.load(rooms)
+    observations = evaluation.observed.load(rooms)
     return walk_rooms(
         cfg,
         [rooms[i] for i in kept],
-        [hearing[i] for i in kept],
-        [sights[i] for i in kept],
+        [observations[i] for i in kept],
         watch,
     )
 

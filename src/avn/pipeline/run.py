@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
-from torch import Tensor
 from torch.utils.tensorboard import SummaryWriter
 
 from avn.agents.rollout import Labels, Watch, walk_room
@@ -19,6 +18,7 @@ from avn.core.files import check_name, written_whole
 from avn.dataset.scene import Scene
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
 from avn.navigation.exploration import EXPLORATIONS
+from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.pipeline import perception_tables
 from avn.pipeline.agent import agent_ignored, agent_settings, agent_stages, build_agent
@@ -143,7 +143,7 @@ class Evaluation(Stage):
                 f"agent.privileged: {cfg.agent.privileged}, but '{type(agent).__name__}' is "
                 f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
             )
-        self.observed.check(type(agent).__name__)
+        self.observed.check(type(agent).__name__, agent.wants(instantiate(cfg.protocol)))
         dry_sounds(cfg)  # a bad file is refused before anything is made
 
     def done(self) -> bool:
@@ -153,11 +153,11 @@ class Evaluation(Stage):
     def make(self) -> None:
         """Walk, and write `episodes.csv`, `results.csv` and TensorBoard."""
         cfg, folder, rooms = self.cfg, self.folder, self.geometry.load()
-        hearing, sights = self.observed.load(rooms)
-        episodes = pd.concat(walk_rooms(cfg, rooms, hearing, sights), ignore_index=True)
+        observations = self.observed.load(rooms)
+        episodes = pd.concat(walk_rooms(cfg, rooms, observations), ignore_index=True)
         protocol: Protocol = instantiate(cfg.protocol)
         walks = [episodes_of(cfg, room, protocol).walks for room in rooms]
-        perception_tables.write(self.observed, rooms, walks, hearing, sights, folder)
+        perception_tables.write(self.observed, rooms, walks, observations, folder)
         summary = results.summarise(episodes)
         _log(cfg, folder, summary)
         with written_whole(folder / "config.yaml") as part:
@@ -169,8 +169,7 @@ class Evaluation(Stage):
 def walk_rooms(
     cfg: DictConfig,
     rooms: Sequence[Scene],
-    hearing: Sequence[Mapping[str, Tensor]],
-    sights: Sequence[Mapping[str, Tensor]],
+    observations: Sequence[SceneObservations],
     watch: Watch | None = None,
 ) -> list[pd.DataFrame]:
     """Let the agent of a config walk all episodes of some rooms.
@@ -178,8 +177,8 @@ def walk_rooms(
     Parameters
     ----------
     rooms : sequence of Scene
-    hearing, sights : sequences of mappings of str to tensor
-        What is heard and seen in each; see `avn.pipeline.observations`.
+    observations : sequence of SceneObservations
+        What is heard and seen in each.
     watch : callable, optional
         Looks on; see `avn.agents.rollout.Watch`.
 
@@ -196,10 +195,8 @@ def walk_rooms(
         look=cfg.look if cfg.planner._target_ else "once",
     )
     return [
-        walk_room(
-            agent, room, episodes_of(cfg, room, protocol), protocol, labels, heard, seen, watch
-        )
-        for room, heard, seen in zip(rooms, hearing, sights, strict=True)
+        walk_room(agent, room, episodes_of(cfg, room, protocol), protocol, labels, own, watch)
+        for room, own in zip(rooms, observations, strict=True)
     ]
 
 

@@ -31,15 +31,15 @@ class FeatureModule(nn.Module):
     ----------
     tables : Tables
     observes : sequence of str
-        Names in `tables.sights` and `tables.hearing`.
+        Names in `tables.visual` and `tables.audio`.
     """
 
     def __init__(self, tables: Tables, observes: Sequence[str]) -> None:
         super().__init__()
-        self.seen = [name for name in observes if name in tables.sights]
-        self.heard = [name for name in observes if name in tables.hearing]
+        self.seen = [name for name in observes if name in tables.visual]
+        self.heard = [name for name in observes if name in tables.audio]
         for name in (*self.seen, *self.heard):
-            table = tables.sights.get(name, tables.hearing.get(name))
+            table = tables.visual.get(name, tables.audio.get(name))
             self.register_buffer(name, table, persistent=False)
 
     def range(self, name: str) -> tuple[float, float]:
@@ -60,8 +60,8 @@ class WalkEnv(EnvBase):
     ----------
     world : World
     observes : sequence of str
-        What an agent observes: names of sights (`feature`, `window`, `view`, `depth`) and of
-        hearing (`sound`, `sound_feature`) that the world's tables have, and `collided`,
+        What an agent observes: names of visual observations (`feature`, `window`, ...) and of
+        audio ones (`sound`, `sound_feature`, ...) that the world's tables have, and `collided`,
         `odometry`, `map`.
     explorations : Explorations, optional
         The walks that episodes begin with; their memories are what `h` and `c` begin with.
@@ -94,7 +94,7 @@ class WalkEnv(EnvBase):
     ) -> None:
         super().__init__(device="cpu", batch_size=[world.n])
         tables = world.tables
-        known = (*tables.sights, *tables.hearing, *OWN)
+        known = (*tables.visual, *tables.audio, *OWN)
         for name in observes:
             if name not in known:
                 raise UserError(f"observes: '{name}' is none of {', '.join(known)}")
@@ -191,7 +191,7 @@ class WalkEnv(EnvBase):
             {
                 "odometry": world.odometry(),
                 "collided": world.collided,
-                "window": world.tables.sights["window"][world.state],
+                "window": world.tables.visual["window"][world.state],
             },
             batch_size=[world.n],
         )

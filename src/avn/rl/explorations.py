@@ -68,7 +68,7 @@ class Explorations:
         """Work through all walks with a network, and keep its memories."""
 
         def inputs(step: int) -> dict[str, Tensor]:
-            own = {"feature": self.tables.sights["feature"][self._flat[:, step]]}
+            own = {"feature": self.tables.visual["feature"][self._flat[:, step]]}
             if self.maps:
                 own["map"] = with_unknown_walk(self._seen[:, step].float())
             return own
@@ -84,9 +84,7 @@ class Explorations:
 
     def _odometry(self) -> Tensor:
         """(R * W, T, 3) int64 since the start of each walk."""
-        first = self._flat[:, :1]
-        frame = first % HEADINGS * self.tables.states
-        return self.tables.places[frame + self._flat] - self.tables.places[frame + first]
+        return self.tables.odometry(self._flat[:, :1], self._flat)
 
     def _draw_maps(self, size: int, width: int) -> None:
         """The map around the agent at each step of the walks, and the maps at their end."""
@@ -96,7 +94,7 @@ class Explorations:
                 {
                     "odometry": odometry[:, step],
                     "collided": torch.zeros(len(self._flat), dtype=torch.bool),
-                    "window": self.tables.sights["window"][self._flat[:, step]],
+                    "window": self.tables.visual["window"][self._flat[:, step]],
                 },
                 batch_size=[len(self._flat)],
             )
@@ -105,7 +103,7 @@ class Explorations:
 
     def _find_places(self, top: int) -> Tensor:
         """Where each state is on the map of each walk, by what it looks like; (R * W, S', 3)."""
-        features, odometry = self.tables.sights["feature"], self._odometry()
+        features, odometry = self.tables.visual["feature"], self._odometry()
         bounds, each = self.tables.first_state.tolist(), self.walks.shape[1]
         longest = max(high - low for low, high in itertools.pairwise(bounds))
         poses = torch.zeros(len(self._flat), longest, 3, dtype=torch.int64)

@@ -1,0 +1,49 @@
+"""What can be observed in an apartment: a tensor for each observation, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class SceneObservations:
+    """Observations of one apartment with K sources and S states.
+
+    Attributes
+    ----------
+    audio : mapping of str to (K, S, sounds, realisations, ...) tensor
+        What is made of each clip.
+    visual : mapping of str to (S, ...) tensor
+        What is seen in each state.
+    """
+
+    audio: Mapping[str, Tensor] = field(default_factory=dict)
+    visual: Mapping[str, Tensor] = field(default_factory=dict)
+
+    @property
+    def sounds(self) -> int | None:
+        """How many sounds are heard; None where nothing is."""
+        return next((heard.shape[2] for heard in self.audio.values()), None)
+
+    @property
+    def realisations(self) -> int:
+        """How many realisations there are of each clip; 1 where nothing is heard."""
+        return next((heard.shape[3] for heard in self.audio.values()), 1)
+
+    def check(self, sources: int, states: int, sounds: int) -> None:
+        """Raise `ValueError` where a tensor has another shape than the apartment asks for."""
+        wanted = (sources, states, sounds)
+        for name, heard in self.audio.items():
+            if heard.dim() < 4 or tuple(heard.shape[:3]) != wanted:
+                raise ValueError(
+                    f"audio '{name}' has shape {tuple(heard.shape)}; wanted (sources, states, "
+                    f"sounds, realisations, ...) with {wanted} in front"
+                )
+        if len({heard.shape[3] for heard in self.audio.values()}) > 1:
+            raise ValueError("what is heard differs in its number of realisations")
+        for name, seen in self.visual.items():
+            if len(seen) != states:
+                raise ValueError(f"'{name}' has {len(seen)} rows for {states} states")
