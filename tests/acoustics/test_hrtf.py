@@ -81,8 +81,25 @@ def test_resampling_keeps_the_shape_of_the_spectrum() -> None:
     assert np.ptp(20 * np.log10(ratio[audible])) < 0.2
 
 
-def test_shape_and_type() -> None:
+def test_a_turn_of_the_head_turns_the_sound_field_the_other_way() -> None:
     filters = load_sh_hrirs().filters(RATE)
-    assert filters.shape[:3] == (4, 2, 16)
     assert filters.dtype == np.float32
-    assert filters.shape[3] == -(-256 // 3)
+    for heading in range(4):
+        # what comes from everywhere alike, and what differs between above and below (ACN 0, 2)
+        np.testing.assert_allclose(filters[heading][:, [0, 2]], filters[0][:, [0, 2]], atol=1e-6)
+    # the two horizontal dipoles (ACN 1 and 3) change their sign on turning round
+    np.testing.assert_allclose(filters[2][:, [1, 3]], -filters[0][:, [1, 3]], atol=1e-6)
+    # and each other's place, one of them its sign, on a quarter turn
+    quarter, north = filters[1][:, [1, 3]], filters[0][:, [3, 1]]
+    signs = np.sign((quarter * north).sum(axis=(0, 2)))
+    assert signs.prod() == -1
+    np.testing.assert_allclose(quarter, north * signs[:, None], atol=1e-6)
+
+
+def test_no_tap_is_lost_in_resampling() -> None:
+    fine, coarse = (load_sh_hrirs().filters(rate) for rate in (48000, RATE))
+    assert fine.shape == (4, 2, 16, 256)
+    assert coarse.shape == (4, 2, 16, -(-256 // 3))
+    for filters in (fine, coarse):
+        energy = (filters.astype(np.float64) ** 2).sum(axis=(0, 1, 2))
+        assert energy[-len(energy) // 10 :].sum() < 1e-3 * energy.sum()  # it has died away

@@ -178,3 +178,23 @@ def test_settings_that_cannot_work_are_refused() -> None:
 def test_only_who_is_given_the_truth_is_privileged() -> None:
     assert not PlannerAgent(OccupancyMapper()).privileged
     assert PlannerAgent(OccupancyMapper(), truth=["window"]).privileged
+
+
+@pytest.mark.parametrize(("backward", "turns"), [(False, 2), (True, 0)])
+def test_what_lies_behind_is_walked_backward_only_where_that_is_allowed(
+    backward: bool, turns: int
+) -> None:
+    corridor = draw("corridor", "Aaaaaaaa")
+    episodes = exhaustive_episodes(corridor, ["ring"], VAR, seed=0)
+    frame = walk_room(
+        PlannerAgent(OccupancyMapper(41), backward=backward),
+        corridor,
+        episodes,
+        VAR,
+        LABELS,
+        SceneObservations(truth(corridor), {"window": windows(corridor)}),
+    )
+    east = frame[(frame["start_heading"] == 1) & (frame["start_cell"] > 4)]
+    assert east["success"].all()
+    assert (east["path"] == east["start_cell"] - 1).all()  # to the cell beside the source
+    assert (east["actions"] - east["path"] == turns).all()

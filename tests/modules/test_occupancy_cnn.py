@@ -170,3 +170,16 @@ def test_bad_option_is_named(changes: dict[str, Any], message: str) -> None:
     assert isinstance(plain, dict)
     with pytest.raises(UserError, match=message):
         OccupancyCnn(**{str(k): v for k, v in plain.items() if not str(k).startswith("_")})
+
+
+@pytest.mark.parametrize("scaled", [True, False])
+def test_probabilities_are_calibrated_only_where_that_is_asked_for(scaled: bool) -> None:
+    data, model = build(scaled=scaled)
+    model.prepare(data)
+    with torch.no_grad():
+        for batch in data.val_dataloader()[0]:
+            model.validation_step(batch, 0)
+            model.validation_step(batch, 0, 1)
+    model.on_validation_epoch_end()
+    identity = torch.tensor([[1.0, 0.0], [1.0, 0.0]])
+    assert torch.equal(model.calibration.cpu(), identity) == (not scaled)

@@ -12,10 +12,31 @@ def clips() -> torch.Tensor:
     return torch.randn(3, 2, 16000, generator=torch.Generator().manual_seed(0)) * 0.1
 
 
-def test_shapes(clips: torch.Tensor) -> None:
-    assert Spectrogram()(clips).shape == (3, 4, 64, 64)
-    assert Spectrogram(interaural=False)(clips).shape == (3, 2, 64, 64)
-    assert Spectrogram(bands=128, frames=128, scale="linear")(clips).shape == (3, 4, 128, 128)
+def test_exchanged_ears_exchange_the_powers_and_turn_the_phase_round(clips: torch.Tensor) -> None:
+    for bands, frames in ((64, 64), (128, 125)):
+        spectrogram = Spectrogram(bands=bands, frames=frames)
+        left, right, real, imaginary = spectrogram(clips).unbind(1)
+        assert left.shape == (3, bands, frames)
+        exchanged = torch.stack((right, left, real, -imaginary), dim=1)
+        torch.testing.assert_close(spectrogram(clips.flip(1)), exchanged, atol=1e-4, rtol=1e-4)
+        powers = Spectrogram(bands=bands, frames=frames, interaural=False)(clips)
+        torch.testing.assert_close(powers, torch.stack((left, right), dim=1))
+
+
+def test_coherence_of_equal_ears_is_one_and_of_a_delay_turns_with_frequency() -> None:
+    noise = torch.randn(1, 16000, generator=torch.Generator().manual_seed(1)) * 0.1
+    delay = 4  # samples
+    clip = torch.stack((noise, noise.roll(delay, dims=-1)), dim=1)
+    linear = Spectrogram(scale="linear", bands=64)
+    same = linear(torch.stack((noise, noise), dim=1))
+    torch.testing.assert_close(same[:, 2], torch.ones_like(same[:, 2]), atol=1e-3, rtol=0)
+    torch.testing.assert_close(same[:, 3], torch.zeros_like(same[:, 3]), atol=1e-3, rtol=0)
+    real, imaginary = linear(clip)[0, 2:].mean(dim=-1)
+    found = torch.atan2(imaginary, real)[4:24].abs()
+    hertz = (torch.arange(64) + 0.5)[4:24] * 8000 / 64
+    expected = 2 * math.pi * hertz * delay / 16000
+    wrapped = expected.where(expected < math.pi, 2 * math.pi - expected)
+    torch.testing.assert_close(found, wrapped, atol=0.2, rtol=0)
 
 
 @pytest.mark.parametrize("scale", ["mel", "linear"])

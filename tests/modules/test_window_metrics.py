@@ -49,10 +49,16 @@ def test_calibration_finds_the_factor_and_shift_that_spoilt_it() -> None:
 
 
 def test_calibration_stays_finite_where_nothing_is_wrong() -> None:
-    fitted = calibration(torch.tensor([5.0, -5.0]), torch.tensor([1.0, 0.0]))
-    assert torch.isfinite(fitted).all()
-    fitted = calibration(torch.tensor([1.0, 2.0]), torch.tensor([1.0, 1.0]))
-    assert torch.isfinite(fitted).all()
+    log_odds = torch.tensor([5.0, -5.0])
+    factor, shift = calibration(log_odds, torch.tensor([1.0, 0.0])).tolist()
+    low, high = sorted(torch.sigmoid(factor * log_odds + shift).tolist())
+    assert low < 0.1 < 0.9 < high  # as sure as two cells and the two of the prior allow
+    assert shift == pytest.approx(0.0, abs=1e-3)
+    # all are free: it believes so, by finite numbers
+    log_odds = torch.tensor([1.0, 2.0] * 50)
+    factor, shift = calibration(log_odds, torch.ones(100)).tolist()
+    said = torch.sigmoid(factor * log_odds + shift)
+    assert 0.9 < float(said.min()) <= float(said.max()) <= 1.0
 
 
 def test_scores_gather_batches() -> None:

@@ -2,10 +2,12 @@
 
 import pytest
 import torch
+from small import composed
 from synthetic_scene import synthetic_scene
 
 from avn.modules.window_metrics import window_metrics
-from avn.pipeline.occupancy import true_windows, window_errors
+from avn.pipeline.apartments import Apartments
+from avn.pipeline.occupancy import LocalPatches, true_windows, window_errors
 from avn.views.camera import CameraConfig
 
 
@@ -23,3 +25,19 @@ def test_errors_are_of_each_room_and_of_all():
     expected = window_metrics(torch.full_like(free, 0.7, dtype=torch.float), free, visible)
     assert table.loc[("all", "prior", "visible"), "ece"] == pytest.approx(expected["ece/visible"])
     assert len(table) == 3 * 2 * 2
+
+
+def test_cells_that_are_not_visible_enough_tell_nothing():
+    free, visible = torch.rand(2, 3, 5, 5, generator=torch.Generator().manual_seed(0)).unbind(0)
+
+    class Given(LocalPatches):
+        def load(self):
+            return [torch.stack((free, visible), dim=1)]
+
+    for least, share in ((0.0, 1.0), (0.4, 0.6), (1.1, 0.0)):
+        cfg = composed("agent=ours_noexp", "split=mini", f"mapper.visible_above={least}")
+        (trusted,) = Given(cfg, Apartments(cfg, "test")).trusted()
+        told = ~trusted.isnan()
+        assert torch.equal(told, visible >= least)
+        assert torch.equal(trusted[told], free[told])
+        assert told.float().mean() == pytest.approx(share, abs=0.1)

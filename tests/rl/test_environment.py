@@ -6,7 +6,7 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import check_env_specs
 
 from avn.core.errors import UserError
-from avn.navigation.starts import build_starts
+from avn.navigation.starts import Starts, build_starts
 from avn.navigation.world import World
 from avn.rl.collectors import LeanCollector, TorchrlCollector
 from avn.rl.environment import WalkEnv
@@ -124,10 +124,10 @@ def test_the_map_is_that_of_where_the_agent_has_been_and_begins_unknown(flat, ru
     tables = random_tables([flat], rules)
     tables.visual["window"][:] = torch.nan  # nothing is seen: only what it stands on and runs into
     env = make_env(tables, rules, n=1, observes=("map",))
-    east = 1
-    env.world.state = env.world.start = torch.tensor([4 * 2 + east])
-    env._map.reset(torch.tensor([True]))
-    env._around = env._look_around(None)
+    east, sources = 1, len(tables.source_room)
+    begins = torch.zeros(sources, dtype=torch.int64)
+    env.world.starts = Starts(1, torch.tensor([4 * 2 + east]), begins, begins + 1)
+    env.begin(torch.tensor([True]))
     assert env.look()["map"].unique().tolist() == [0.5, 1.0]  # it stands somewhere
     env.move(torch.tensor([0]))
     around = env.look()["map"][0, 0]

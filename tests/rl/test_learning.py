@@ -83,10 +83,10 @@ def t_maze_success(memory: int) -> float:
     worker.collector.restart()
     for _ in range(900):
         worker.update()
-    worker._scores.figures()
+    worker.scores.figures()
     for _ in range(60):
-        worker._scores.take(worker.collector.collect())
-    return worker._scores.figures()["success"]
+        worker.scores.take(worker.collector.collect())
+    return worker.scores.figures()["success"]
 
 
 def test_a_t_maze_whose_cue_lies_in_the_past_is_solved_with_memory():

@@ -45,9 +45,9 @@ def test_returns_end_at_the_goal_and_go_on_where_an_episode_was_cut_off(flat, ru
     worker, batch = batch_of(task)
     ended = batch["next"]
     assert ended["truncated"].any()
-    joint = worker.loss._joint(batch)
+    joint = worker.loss.joint(batch)
     value = worker.network.critic(joint).detach()
-    advantage, target = worker.loss._returns(batch, value)
+    advantage, target = worker.loss.returns(batch, value)
     expected = returns_by_hand(worker, batch, 0.9)
     assert torch.allclose(target[..., 0], expected, atol=1e-4)
     assert torch.allclose(advantage, target - value, atol=1e-4)
@@ -57,8 +57,8 @@ def test_the_loss_is_that_of_a3c(flat, rules):
     task = make_task(random_tables([flat], rules), rules, entropy=0.02, value=0.5)
     worker, batch = batch_of(task)
     total, figures = worker.loss(batch)
-    joint = worker.loss._joint(batch)
-    advantage, target = worker.loss._returns(batch, worker.network.critic(joint).detach())
+    joint = worker.loss.joint(batch)
+    advantage, target = worker.loss.returns(batch, worker.network.critic(joint).detach())
     logits, value = worker.network.actor(joint), worker.network.critic(joint)
     log_p = F.log_softmax(logits, dim=-1)
     chosen = log_p.gather(-1, batch["action"][..., None])
@@ -79,10 +79,10 @@ def test_gradients_agree_with_finite_differences(flat, rules, memory):
     batch = batch.apply(lambda t: t.double() if t.is_floating_point() else t)
     features = worker.env.features.double()
     loss = ActorCriticLoss(network, features, task.recipe)
-    joint = loss._joint(batch)
+    joint = loss.joint(batch)
     with torch.no_grad():
-        fixed = loss._returns(batch, network.critic(joint))
-    loss._returns = lambda *_: fixed  # targets and advantages are no part of the gradient
+        fixed = loss.returns(batch, network.critic(joint))
+    loss.returns = lambda *_: fixed  # targets and advantages are no part of the gradient
 
     def value() -> float:
         return float(loss(batch)[0].detach())

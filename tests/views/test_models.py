@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import shutil
 from collections import defaultdict
 from itertools import combinations
 from pathlib import Path
@@ -14,6 +15,7 @@ import yaml
 
 from avn.apartments.floor_plan import FloorPlan, Piece, Room
 from avn.apartments.splits import PARTS, SplitConfig, load_split
+from avn.views import furniture_models
 from avn.views.furniture_models import FOLDER, assets_hash, catalogue, load_model
 from avn.views.models import choose, copies, distortion, furniture_mesh
 from avn.views.rays import Triangles
@@ -148,7 +150,18 @@ def test_same_apartment_same_triangles_and_another_look_other_ones() -> None:
     assert [t.tobytes() for t in one.textures] == [t.tobytes() for t in same.textures]
     looks = {furniture_mesh(plan, "train", look).vertices.tobytes() for look in range(4)}
     assert len(looks) > 1
-    assert assets_hash() == assets_hash()
+
+
+def test_the_hash_of_the_models_is_of_their_files(tmp_path, monkeypatch) -> None:
+    before = assets_hash()
+    folder = Path(shutil.copytree(furniture_models.FOLDER, tmp_path / "models"))
+    monkeypatch.setattr(furniture_models, "FOLDER", folder)
+    assert furniture_models.assets_hash.__wrapped__() == before
+    model = next(folder.glob("*.npz"))
+    content = bytearray(model.read_bytes())
+    content[-1] ^= 1
+    model.write_bytes(content)
+    assert furniture_models.assets_hash.__wrapped__() != before
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,13 @@ def test_rooms_of_one_pool_differ_and_draws_repeat():
 
 
 def test_materials_that_no_pool_names_are_painted():
-    assert pattern("glass", "test", "flat", 0).picture.shape == (PIXELS, PIXELS, 3)
+    for part in PARTS:
+        for room in range(4):
+            picture = pattern("glass", part, "flat", room).picture
+            assert picture.shape == (PIXELS, PIXELS, 3)
+            mean = picture.mean(axis=(0, 1))
+            paints = np.array(COLOURS[part]["plaster"])
+            assert np.abs(paints - mean).max(axis=1).min() < 15  # one of the pool's, a little off
 
 
 def test_the_sky_is_above_and_brighter_than_the_ground():

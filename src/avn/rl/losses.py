@@ -58,10 +58,10 @@ class ActorCriticLoss:
         batch : TensorDict (N, T)
             See `avn.rl.collectors.Batches`.
         """
-        joint = self._joint(batch)
+        joint = self.joint(batch)
         with torch.no_grad():
             value = self.network.critic(joint)
-            advantage, target = self._returns(batch, value)
+            advantage, target = self.returns(batch, value)
         flat = {
             "joint": joint.flatten(0, 1),
             "action": batch["action"].flatten(),
@@ -76,7 +76,7 @@ class ActorCriticLoss:
             figures["entropy"] = losses["entropy"]
         return total, {name: float(figure.detach()) for name, figure in figures.items()}
 
-    def _joint(self, batch: TensorDict) -> Tensor:
+    def joint(self, batch: TensorDict) -> Tensor:
         """What the heads see at each step, (N, T, D), with gradients."""
         network, shape = self.network, batch.batch_size
         inputs = _inputs(batch, self.features)
@@ -86,7 +86,7 @@ class ActorCriticLoss:
             return embedding
         return network.unroll(embedding, batch["h"], batch["c"], batch["is_init"][..., 0])
 
-    def _returns(self, batch: TensorDict, value: Tensor) -> tuple[Tensor, Tensor]:
+    def returns(self, batch: TensorDict, value: Tensor) -> tuple[Tensor, Tensor]:
         """Advantages and targets, (N, T, 1) each.
 
         The value after a step is that of the next step, but for the last one, and where the

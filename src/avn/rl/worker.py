@@ -112,13 +112,13 @@ class Worker:
         total = max(1, recipe.total // recipe.batch)
         falling = recipe.schedule == "linear"
         self.rate = lambda done: recipe.lr * (max(0.0, 1 - done / total) if falling else 1.0)
-        self._scores, self._refresh = Scores(recipe.episodes), recipe.refresh
+        self.scores, self._refresh = Scores(recipe.episodes), recipe.refresh
 
     def update(self) -> dict[str, float]:
         """Gather one batch and apply its gradient; gives figures by name."""
         self._explore()
         batch = self.collector.collect()
-        self._scores.take(batch)
+        self.scores.take(batch)
         self.gradients.zero_()
         loss, figures = self.loss(batch)
         loss.backward()
@@ -137,7 +137,7 @@ class Worker:
             figures.append(self.update())
             progress()
         means = {name: sum(f[name] for f in figures) / len(figures) for name in figures[0]}
-        return means | self._scores.figures()
+        return means | self.scores.figures()
 
     def state_dict(self) -> dict[str, Any]:
         """All that goes on changing, but for the shared state."""
@@ -146,7 +146,7 @@ class Worker:
             "actions": self.policy.generator.get_state(),
             "weights": self.weights.clone(),
             "updates": self.updates,
-            "scores": self._scores.state_dict(),
+            "scores": self.scores.state_dict(),
         }
         if self.explorations is not None:
             kept["memories"] = (self.explorations.h.clone(), self.explorations.c.clone())
@@ -160,7 +160,7 @@ class Worker:
             self.explorations.h, self.explorations.c = kept["memories"]
         self.env.load_state_dict(kept["env"])
         self.policy.generator.set_state(kept["actions"])
-        self._scores.load_state_dict(kept["scores"])
+        self.scores.load_state_dict(kept["scores"])
         self.collector.restart()
 
     def _explore(self) -> None:
@@ -184,7 +184,7 @@ class Scores:
 
     def __init__(self, n: int) -> None:
         self._running = torch.zeros(n)
-        self._returns: list[float] = []
+        self.returns: list[float] = []
         self._successes: list[float] = []
 
     def take(self, batch: Any) -> None:
@@ -193,27 +193,27 @@ class Scores:
         for step in range(rewards.shape[1]):
             self._running = self._running + rewards[:, step]
             ended = done[:, step]
-            self._returns += self._running[ended].tolist()
+            self.returns += self._running[ended].tolist()
             self._successes += (rewards[:, step][ended] > 0).float().tolist()
             self._running = self._running.masked_fill(ended, 0.0)
 
     def figures(self) -> dict[str, float]:
         """Means by name, of what has ended; nothing where nothing has."""
-        if not self._returns:
+        if not self.returns:
             return {}
-        count = len(self._returns)
+        count = len(self.returns)
         found = {
-            "return": sum(self._returns) / count,
+            "return": sum(self.returns) / count,
             "success": sum(self._successes) / count,
         }
-        self._returns, self._successes = [], []
+        self.returns, self._successes = [], []
         return found
 
     def state_dict(self) -> Any:
         """All that goes on changing."""
-        return self._running.clone(), list(self._returns), list(self._successes)
+        return self._running.clone(), list(self.returns), list(self._successes)
 
     def load_state_dict(self, kept: Any) -> None:
         """Go on where `state_dict` was taken."""
         running, returns, successes = kept
-        self._running, self._returns, self._successes = running.clone(), [*returns], [*successes]
+        self._running, self.returns, self._successes = running.clone(), [*returns], [*successes]
