@@ -11,11 +11,11 @@ from avn.acoustics.clips import (
     CLIP_SAMPLES,
     ClipRenderer,
     DrySounds,
-    MicrophoneConfig,
     brir_spectra,
     export_wav,
 )
 from avn.acoustics.dry_sounds import BUILTIN, load_sounds
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 

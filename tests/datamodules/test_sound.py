@@ -2,7 +2,7 @@ import pytest
 import torch
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
-from avn.acoustics.clips import MicrophoneConfig
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.core.errors import UserError
 from avn.datamodules.sound import ClipSet, FreshTakes, SoundData
 from avn.dataset.source_locations import relative_locations

@@ -3,7 +3,7 @@ import pytest
 import torch
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
-from avn.acoustics.clips import MicrophoneConfig
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.apartments.grid import goal_cells
 from avn.core.errors import UserError
 from avn.datamodules.stop import GoalOften, StopData, moves_to_goal

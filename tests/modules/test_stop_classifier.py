@@ -7,7 +7,7 @@ from hydra.utils import instantiate
 from omegaconf import OmegaConf
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
-from avn.acoustics.clips import MicrophoneConfig
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.apartments.grid import goal_cells
 from avn.core.errors import UserError
 from avn.datamodules.stop import StopData

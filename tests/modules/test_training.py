@@ -9,7 +9,7 @@ from omegaconf import OmegaConf
 from synthetic_scene import synthetic_scene, synthetic_sounds
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from avn.acoustics.clips import MicrophoneConfig
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.core.errors import UserError
 from avn.datamodules.sound import SoundData
 from avn.modules.sound_cnn import SoundCnn, SoundModelConfig

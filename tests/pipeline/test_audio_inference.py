@@ -5,7 +5,7 @@ from hydra.utils import instantiate
 from omegaconf import OmegaConf
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
-from avn.acoustics.clips import MicrophoneConfig
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.datamodules.sound import ClipSet
 from avn.modules.sound_cnn import SoundCnn, SoundModelConfig
 from avn.pipeline.audio_inference import hear, sound_errors

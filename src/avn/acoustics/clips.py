@@ -9,9 +9,7 @@ by a counter-based hash, so that any clip can be rendered at any time, alone or 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from hashlib import sha256
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +21,7 @@ from torch.nn.functional import pad
 
 from avn.acoustics.counter_hash import absorb, integers
 from avn.acoustics.dry_sounds import RATE
+from avn.acoustics.microphone import MicrophoneConfig, build_microphone
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.files import written_whole
@@ -35,32 +34,6 @@ HOP = 160  # grid of the places where a second may begin
 LEAST_LEVEL = 0.5  # of the usual level of the sound: -6 dB
 NOISE_SAMPLES = 1 << 19  # 33 s of noise an ear
 EXPORT_FACTOR = 0.1
-
-
-@dataclass
-class MicrophoneConfig:
-    """Config node `microphone`.
-
-    Attributes
-    ----------
-    noise_rms : float
-        RMS of each microphone's noise. Dry sounds have RMS 1, so the direct sound of a source at
-        1 m in front has 1 / sqrt(4 pi) = 0.28, which is 35 dB above the default; three rooms
-        away, some 24 dB weaker, sound still stands 11 dB above it.
-    gain : float
-        Factor on the sound at the microphone, before its noise.
-    """
-
-    noise_rms: float = 0.005
-    gain: float = 1.0
-
-
-def check_microphone(config: MicrophoneConfig) -> None:
-    """Raise UserError where a value of the config node `microphone` makes no sense."""
-    if not (isfinite(config.noise_rms) and config.noise_rms >= 0):
-        raise UserError(f"microphone.noise_rms={config.noise_rms}: give 0 or more, such as 0.005")
-    if not (isfinite(config.gain) and config.gain > 0):
-        raise UserError(f"microphone.gain={config.gain}: give more than 0, such as 1.0")
 
 
 class DrySounds:
@@ -141,7 +114,7 @@ class ClipRenderer:
     sounds : DrySounds
         The bank; clips are rendered on its device.
     microphone : MicrophoneConfig
-        Noise floor and gain.
+        What it records with.
     seed : int
         Seed of all that is random.
     purpose : str
@@ -158,9 +131,8 @@ class ClipRenderer:
     def __init__(
         self, sounds: DrySounds, microphone: MicrophoneConfig, seed: int, purpose: str
     ) -> None:
-        check_microphone(microphone)
         self.sounds = sounds
-        self.microphone = microphone
+        self.microphone = build_microphone(microphone)
         device = sounds.keys.device
         words = torch.tensor([int(seed), PURPOSES.index(purpose)], device=device)
         self._key = absorb(torch.zeros((), dtype=torch.int64, device=device), words)
@@ -198,14 +170,13 @@ class ClipRenderer:
         dry = torch.fft.rfft(self.sounds.seconds(sound, place, phase))
         used = spectra if index is None else spectra[index]
         clips = torch.fft.irfft(dry[:, None, :] * used, n=CLIP_SAMPLES)
-        if self.microphone.gain != 1:
-            clips *= self.microphone.gain
-        if self.microphone.noise_rms > 0:
-            for ear, draw in enumerate((left, right)):
-                pieces = self._noise[ear].unfold(0, CLIP_SAMPLES, 1)
-                noise = pieces[draw % len(pieces)]
-                clips[:, ear].add_(noise, alpha=self.microphone.noise_rms)
-        return clips
+        draws = (left, right)
+
+        def noise(ear: int) -> Tensor:
+            pieces = self._noise[ear].unfold(0, CLIP_SAMPLES, 1)
+            return pieces[draws[ear] % len(pieces)]
+
+        return self.microphone.record(clips, noise)
 
 
 def brir_spectra(brirs: Tensor) -> Tensor:

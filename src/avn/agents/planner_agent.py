@@ -33,11 +33,17 @@ _TIE = 0.01
 
 
 @dataclass
-class PlannerConfig:
-    """Schema of the config node `planner`; the fields mean what `PlannerAgent` says."""
+class PlannerBase:
+    """What every option of the config group `planner` has; a null target is no planner."""
 
     _target_: str | None = None
     name: str = "none"
+
+
+@dataclass
+class PlannerConfig(PlannerBase):
+    """Schema of `planner=dijkstra`; the fields mean what `PlannerAgent` says."""
+
     look: str = "once"
     source: str = "newest"
     blocked_below: float = 0.5
@@ -92,7 +98,6 @@ class PlannerAgent(Agent):
         patience: int = 4,
         stop_at: float = 0.5,
         truth: Sequence[str] = (),
-        name: str = "dijkstra",
     ) -> None:
         for part in truth:
             if part not in TRUTH:

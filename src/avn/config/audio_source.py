@@ -72,3 +72,6 @@ class AudioFilesPath(SearchPathPlugin):
 
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
         search_path.append("avn", "audio://")
+
+
+PLUGINS = (AudioFiles, AudioFilesPath)

@@ -24,7 +24,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from avn.config import audio_source, schema, sweeps
+from avn.config import audio_source, schema, sweeps, user_configs
 from avn.config.folder import conf_folder
 from avn.core.errors import UserError
 
@@ -81,7 +81,7 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
     job.__module__ = name
     is_sweep = False
     try:
-        sys.argv = [sys.argv[0], *arrange(sys.argv[1:])]
+        sys.argv = [sys.argv[0], *arrange(user_configs.take_folders(sys.argv[1:]))]
         is_sweep = "--multirun" in sys.argv
         if is_sweep:
             sweeps.begin()
@@ -227,5 +227,5 @@ def _one_line(text: str) -> str:
 
 
 def _register_plugins() -> None:
-    for plugin in (audio_source.AudioFiles, audio_source.AudioFilesPath):
+    for plugin in (*audio_source.PLUGINS, *user_configs.PLUGINS):
         Plugins.instance().register(plugin)

@@ -12,6 +12,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from avn.config import schema
 from avn.config.folder import conf_folder
+from avn.config.signatures import is_foreign, with_signature
 from avn.core.errors import UserError
 
 
@@ -54,6 +55,10 @@ def _typed(plain: Any) -> DictConfig:
 
 def _with_schema(group: str, node: DictConfig, default: DictConfig) -> DictConfig:
     """A group's node with that of its schemas that fits it best: the fewest keys it has not."""
+    if is_foreign(group, node):
+        return with_signature(group, node)
+    if group == "training" and is_foreign("microphone", node.get("microphone")):
+        node.microphone = with_signature("microphone", node.microphone)
     found = [schema for (own, _), schema in schema.SCHEMAS.items() if own == group]
     nodes = [OmegaConf.structured(schema) for schema in found]
     fitting = [own for own in nodes if set(map(str, node)) <= set(map(str, own))]

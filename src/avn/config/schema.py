@@ -13,11 +13,11 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import II, MISSING
 
 from avn.acoustics.brir import AcousticsConfig
-from avn.acoustics.clips import MicrophoneConfig
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.agents.actor_critic import ActorCriticConfig
 from avn.agents.base import BaselineConfig
 from avn.agents.greedy import GreedyConfig
-from avn.agents.planner_agent import PlannerConfig
+from avn.agents.planner_agent import PlannerBase, PlannerConfig
 from avn.apartments.splits import SplitConfig
 from avn.mapping.config import MapperConfig, MemoryConfig
 from avn.modules.occupancy_cnn import OccupancyConfig
@@ -84,7 +84,7 @@ class CoreConfig:
     backbone: BackboneConfig = MISSING
     occupancy_model: OccupancyConfig = MISSING
     mapper: MapperConfig = MISSING
-    planner: PlannerConfig = MISSING
+    planner: PlannerBase = MISSING
     baseline: BaselineConfig = MISSING
     a3c: A3CConfig = field(default_factory=lambda: A3CConfig(train_seed=_SEED))
     look: str = MISSING
@@ -138,6 +138,27 @@ class ReproduceConfig(CoreConfig):
     train_seeds: list[int] = MISSING
 
 
+# What every option of a group has. A class from outside the package adds its own parameters.
+BASES: dict[str, type] = {
+    "sound_model": SoundModelConfig,
+    "stop_model": StopModelConfig,
+    "occupancy_model": OccupancyConfig,
+    "mapper": MapperConfig,
+    "planner": PlannerBase,
+    "baseline": BaselineConfig,
+    "protocol": ProtocolConfig,
+    "microphone": MicrophoneConfig,
+    "renderer": RendererConfig,
+    "backbone": BackboneConfig,
+}
+# Parameters that the pipeline gives, and no config.
+GIVEN = {
+    "occupancy_model": ("camera",),
+    "planner": ("mapper", "truth", "stop_at"),
+    "baseline": ("network", "hears", "maps", "map_size"),
+}
+# Parameters that follow the setting of the same name, unless they are given.
+LINKED = {"train_seed": _SEED, "look": II("look")}
 COMMANDS = {
     "generate": GenerateConfig,
     "train": TrainConfig,

@@ -11,7 +11,8 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
-from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
+from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.prefetch import AheadLoader

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Sampler
 
-from avn.acoustics.clips import DrySounds, MicrophoneConfig
+from avn.acoustics.clips import DrySounds
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.core.errors import UserError
 from avn.datamodules.sound import ClipSet, SoundData
 from avn.dataset.scene import AudibleScene, Scene

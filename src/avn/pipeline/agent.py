@@ -12,7 +12,7 @@ from avn.modules.network import build_part
 from avn.pipeline import policy, stop_classifier
 from avn.pipeline.stage import Stage
 
-# Settings of the node `mapper` that are no arguments of the mapper.
+# Settings of the nodes `mapper` and `planner` that are no arguments of their classes.
 _OTHERS = ("name", "visible_above")
 
 
@@ -47,10 +47,12 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
         )
     if not cfg.mapper._target_:
         raise UserError("mapper: 'none' remembers nothing to plan on; choose occupancy")
-    given: dict[str, Any] = {"mapper": build_part(_settings(cfg.mapper)), "truth": cfg.agent.truth}
+    given: dict[str, Any] = {"mapper": build_part(_arguments(cfg.mapper))}
+    if cfg.agent.truth:
+        given["truth"] = cfg.agent.truth
     if ready and decides(cfg):
         given["stop_at"] = stop_classifier.StopNetwork(cfg).threshold()
-    return build_part(cfg.planner, **given)
+    return build_part(_arguments(cfg.planner), **given)
 
 
 def decides(cfg: DictConfig) -> bool:
@@ -81,7 +83,7 @@ def agent_settings(cfg: DictConfig) -> list[str]:
 def agent_ignored(cfg: DictConfig) -> list[str]:
     """Keys below those of `agent_settings` that make no difference to it."""
     unread = [f"mapper.{name}" for name in _OTHERS]
-    if cfg.planner.get("source") == "newest":
+    if "source" in cfg.planner and cfg.planner.source == "newest":
         unread.append("planner.error")  # estimates are not weighed
     if policy.learns(cfg):
         unread += [key for key in policy.Policy(cfg).ignored() if key != "baseline.samples"]
@@ -94,7 +96,7 @@ def check_no_truth(cfg: DictConfig) -> None:
         raise UserError("agent.truth: only agents that plan can be given a part of the truth")
 
 
-def _settings(mapper: DictConfig) -> dict[str, Any]:
-    """What the mapper's class takes."""
-    node: Any = OmegaConf.to_container(mapper, resolve=True)
-    return {key: value for key, value in node.items() if key not in _OTHERS}
+def _arguments(node: DictConfig) -> dict[str, Any]:
+    """What the class of a mapper or planner takes."""
+    every: Any = OmegaConf.to_container(node, resolve=True)
+    return {key: value for key, value in every.items() if key not in _OTHERS}

@@ -14,7 +14,8 @@ import torch
 from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
-from avn.acoustics.clips import ClipRenderer, DrySounds, MicrophoneConfig, brir_spectra
+from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra
+from avn.acoustics.microphone import MicrophoneConfig
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.prefetch import made_ahead, threads_for_one_operation

@@ -239,7 +239,9 @@ def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
     settings |= {key: cfg[key].name for key in ("sound_model", "mapper", "planner")}
     settings |= {"seed": cfg.seed, "train_seed": cfg.train_seed, "episodes": cfg.episodes}
     settings |= {key: cfg[key] for key in ("look", "exploration", "localisation")}
-    settings |= {"part": cfg.part, "source": cfg.planner.source}
+    settings |= {"part": cfg.part}
+    if "source" in cfg.planner:
+        settings["source"] = cfg.planner.source
     settings["sounds"] = "-".join(sound_files(cfg))
     figures = results.headline(summary)
     with SummaryWriter(str(folder)) as writer:

@@ -20,6 +20,7 @@ import torch
 from numpy.typing import NDArray
 from torch.nn.functional import interpolate, normalize
 
+from avn.core.classes import import_class
 from avn.core.errors import UserError
 from avn.core.hashing import digest, file_hash
 
@@ -143,11 +144,7 @@ def first_line(error: Exception) -> str:
 
 def backbone_class(cfg: BackboneConfig) -> type[Backbone]:
     """The class that `_target_` names; raises `UserError` where there is none."""
-    module, _, name = cfg._target_.rpartition(".")
-    try:
-        found: type[Backbone] = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise UserError(f"backbone._target_: '{cfg._target_}' cannot be had ({error})") from error
+    found: type[Backbone] = import_class("backbone._target_", cfg._target_)
     if cfg.size < 32:
         raise UserError(f"backbone.size={cfg.size} is too small; give at least 32 pixels")
     return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import CEILING, FloorPlan
+from avn.core.classes import import_class
 from avn.core.errors import UserError
 from avn.views.camera import CameraConfig
 from avn.views.lighting import LightConfig
@@ -111,9 +111,5 @@ def check_light(cfg: LightConfig) -> None:
 
 def renderer_class(cfg: RendererConfig) -> type[Renderer]:
     """The class that `_target_` names; raises `UserError` where there is none."""
-    module, _, name = cfg._target_.rpartition(".")
-    try:
-        found: type[Renderer] = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise UserError(f"renderer._target_: '{cfg._target_}' cannot be had ({error})") from error
+    found: type[Renderer] = import_class("renderer._target_", cfg._target_)
     return found

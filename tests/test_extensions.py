@@ -1,0 +1,292 @@
+"""Parts from outside the package: one importable file and one config file each, nothing else."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import torch
+import yaml
+from small import A3C, EYES, SMALL, fitting
+
+from avn.acoustics.microphone import Microphone
+from avn.config.saved import read_config
+from avn.pipeline.run import Evaluation
+
+PARTS = '''
+import dataclasses
+
+import numpy as np
+import torch
+from torch import nn
+
+from avn.acoustics.microphone import Microphone
+from avn.agents.base import Agent
+from avn.agents.planner_agent import PlannerAgent
+from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT
+from avn.mapping.occupancy_mapper import OccupancyMapper
+from avn.modules.occupancy_cnn import OccupancyCnn
+from avn.modules.sound_cnn import SoundCnn
+from avn.navigation.protocols import Protocol
+from avn.views.renderer import Renderer, RendererConfig
+
+
+class DeepSound(SoundCnn):
+    """A sound network with more layers behind its answer."""
+
+    def __init__(self, layers: int = 2, **recipe):
+        super().__init__(**recipe)
+        self.net.layers.extend(nn.Linear(2, 2) for _ in range(layers))
+
+
+class PatientSight(OccupancyCnn):
+    """An occupancy network that is less sure the lower its temperature."""
+
+    def __init__(self, temperature: float = 2.0, **recipe):
+        super().__init__(**recipe)
+        self.temperature = temperature
+
+    def log_odds(self, pictures):
+        return super().log_odds(pictures) / self.temperature
+
+
+class ForgetfulMapper(OccupancyMapper):
+    """Forgets its map after some steps."""
+
+    def __init__(self, size: int = 101, after: int = 20):
+        super().__init__(size)
+        self.after, self.steps = after, 0
+
+    def observe(self, observation, way):
+        self.steps += 1
+        if self.steps % self.after == 0:
+            self.map.log_odds.zero_()
+        super().observe(observation, way)
+
+
+class LazyPlanner(PlannerAgent):
+    """Does nothing but turn for the first steps."""
+
+    def __init__(self, mapper, rest: int = 3, detour: float = 2.0, truth=(), stop_at: float = 0.5):
+        super().__init__(mapper, detour=detour, truth=truth, stop_at=stop_at)
+        self.resting = rest
+
+    def reset(self, n, generator, protocol):
+        super().reset(n, generator, protocol)
+        self.left = self.resting
+
+    def act(self, observation):
+        actions = super().act(observation)
+        self.left -= 1
+        return torch.full_like(actions, ROTATE_LEFT) if self.left >= 0 else actions
+
+
+class Square(Agent):
+    """Walks round a square."""
+
+    def __init__(self, side: int = 4, clockwise: bool = True):
+        self.side, self.turn = side, ROTATE_RIGHT if clockwise else ROTATE_LEFT
+
+    def reset(self, n, generator, protocol):
+        super().reset(n, generator, protocol)
+        self.step = 0
+
+    def act(self, observation):
+        self.step += 1
+        action = self.turn if self.step % (self.side + 1) == 0 else FORWARD
+        return torch.full((self.n,), action)
+
+
+@dataclasses.dataclass(frozen=True)
+class NearProtocol(Protocol):
+    """Succeeds within some moves of the source."""
+
+    within: int = 3
+
+    def goal_cells(self, grid, sources):
+        return grid.distances[sources] <= self.within
+
+
+@dataclasses.dataclass
+class StripesConfig(RendererConfig):
+    period: int = 4
+
+
+class Stripes(Renderer):
+    """Pictures of stripes, as bright as the heading."""
+
+    def __init__(self, cfg: StripesConfig, plan, part, look=0, prepared=None):
+        self.cfg = cfg
+
+    def prepare(self):
+        return {"nothing": np.zeros(1)}
+
+    def views(self, centres, headings):
+        size = self.cfg.camera.size
+        stripes = (np.arange(size) // self.cfg.period % 2 * 100).astype(np.uint8)
+        rgb = np.empty((len(headings), size, size, 3), np.uint8)
+        light = (20 * headings)[:, None, None, None].astype(np.uint8)
+        rgb[:] = stripes[None, None, :, None] + light
+        return rgb, np.ones((len(headings), size, size), np.float16)
+
+
+class Clipping(Microphone):
+    """Cannot record more than so much."""
+
+    def __init__(self, limit: float = 0.1, **base):
+        super().__init__(**base)
+        self.limit = limit
+
+    def record(self, clips, noise):
+        return super().record(clips, noise).clamp_(-self.limit, self.limit)
+'''
+OPTIONS = {
+    "sound_model/deep": {"_target_": "own_parts.DeepSound", "name": "deep"},
+    "occupancy_model/patient": {"_target_": "own_parts.PatientSight", "name": "patient"},
+    "mapper/forgetful": {"_target_": "own_parts.ForgetfulMapper", "name": "forgetful"},
+    "planner/lazy": {"_target_": "own_parts.LazyPlanner", "name": "lazy"},
+    "baseline/square": {"_target_": "own_parts.Square"},
+    "protocol/near": {
+        "_target_": "own_parts.NearProtocol",
+        "name": "near",
+        "goal": "box",
+        "says_stop": False,
+        "path": "attempted",
+    },
+    "renderer/stripes": {"_target_": "own_parts.Stripes", "name": "stripes"},
+    "microphone/clipping": {"_target_": "own_parts.Clipping"},
+}
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory):
+    """The folder of the file, and that of the config files."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "own_parts.py").write_text(PARTS)
+    for option, content in OPTIONS.items():
+        path = folder / "conf" / f"{option}.yaml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(yaml.safe_dump(content))
+    return folder
+
+
+@pytest.fixture
+def run(own, command, outputs, monkeypatch):
+    monkeypatch.syspath_prepend(own)
+
+    def go(name, chosen, *options):
+        where = ("--config-dir", str(own / "conf"), f"outputs={outputs}")
+        shared = [*SMALL, *EYES, *A3C]
+        if "renderer=stripes" in options:  # which has a camera and no light
+            shared = [own for own in shared if not own.startswith(("renderer.l", "renderer.s"))]
+        settings = fitting(chosen, *shared)
+        code, out, err = command(name, *where, chosen, *settings, *options)
+        assert code == 0, err
+        return Path(out[-1])
+
+    return go
+
+
+def episodes(folder):
+    return pd.read_csv(folder / "episodes.csv")
+
+
+def test_a_sound_network_with_settings_of_its_own_feeds_an_actor_critic(run):
+    folder = run("train", "model=a3c_va", "sound_model=deep", "sound_model.layers=3")
+    run_folder = run("eval", "agent=a3c_va", "sound_model=deep", "sound_model.layers=3")
+    cfg = read_config(run_folder)
+    assert cfg.sound_model.layers == 3
+    assert Evaluation(cfg).folder == run_folder  # and pictures of the run find it again
+    cards = [path.read_text() for path in folder.parent.glob("sound_cnn-*/model_card.md")]
+    assert any("layers: 3" in card for card in cards)
+
+
+def test_an_occupancy_network(run):
+    sure = run("eval", "agent=ours_noexp", "occupancy_model=patient")
+    unsure = run(
+        "eval", "agent=ours_noexp", "occupancy_model=patient", "occupancy_model.temperature=9.0"
+    )
+    assert sure != unsure
+
+
+def test_a_mapper(run):
+    one, other = (
+        run("eval", "agent=ours_noexp", "mapper=forgetful", "occupancy_model=small", more)
+        for more in ("mapper.after=1", "mapper.after=500")
+    )
+    assert not episodes(one).equals(episodes(other))
+
+
+def test_a_planner(run):
+    found = episodes(run("eval", "agent=ours_noexp", "planner=lazy", "planner.rest=6"))
+    assert (found["actions"] - found["path"] >= 6).all()
+
+
+def test_an_agent_with_settings(run):
+    chosen = ("agent=random_walk", "baseline=square", "agent.name=square")
+    one, other = (
+        episodes(run("eval", *chosen, more))
+        for more in ("baseline.side=1", "baseline.clockwise=false")
+    )
+    assert not one["end_cell"].equals(other["end_cell"])
+
+
+def test_a_protocol(run):
+    strict, kind = (
+        episodes(run("eval", "agent=random_walk", "protocol=near", f"protocol.within={moves}"))
+        for moves in (1, 6)
+    )
+    # nobody begins at the goal, and it reaches six moves of half a metre far
+    assert kind["geodesic"].min() > 3.0 >= strict["geodesic"].min()
+    assert kind["success"].any()
+
+
+def test_a_renderer(run, outputs):
+    folder = run("eval", "agent=ours_noexp", "renderer=stripes", "renderer.period=2")
+    assert (folder / "results.csv").is_file()
+    assert list(outputs.glob("generate/room_1-*/views-stripes-*.h5"))
+
+
+def test_a_condition_of_the_microphone(run):
+    clean = run("eval", "agent=greedy")
+    clipped = run("eval", "agent=greedy", "microphone=clipping", "microphone.limit=0.02")
+    assert Evaluation(read_config(clipped)).folder == clipped
+    heard = [(folder / "hearing.csv").read_text() for folder in (clean, clipped)]
+    assert heard[0] != heard[1]
+
+
+def test_a_condition_is_what_its_class_says(own, monkeypatch):
+    monkeypatch.syspath_prepend(own)
+    from own_parts import Clipping
+
+    clips = torch.tensor([[[0.5, -0.01], [0.3, 0.0]]])
+    found = Clipping(limit=0.1, noise_rms=0.0, gain=2.0).record(clips.clone(), lambda ear: None)
+    torch.testing.assert_close(found, (2 * clips).clamp(-0.1, 0.1))
+    assert isinstance(Clipping(), Microphone)
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("baseline=square", "baseline.sid=3"), "Key 'sid' not in 'SquareSettings'"),
+        (("baseline=square", "baseline.side=long"), "could not be converted to Integer"),
+        (("baseline=square", "+baseline.colour=red"), "colour"),
+    ],
+)
+def test_a_mistake_in_them_is_one_line(own, command, outputs, monkeypatch, options, line):
+    monkeypatch.syspath_prepend(own)
+    where = ("--config-dir", str(own / "conf"), f"outputs={outputs}", "split=mini")
+    code, _, err = command("eval", *where, "agent=random_walk", *options)
+    assert code == 2
+    assert len(err) == 1
+    assert line in err[0]
+
+
+def test_a_class_that_cannot_be_imported_is_one_line(own, command, outputs, tmp_path):
+    (tmp_path / "baseline").mkdir()
+    (tmp_path / "baseline" / "gone.yaml").write_text("_target_: nowhere.Gone\n")
+    for folder, line in ((tmp_path, "nowhere.Gone"), (tmp_path / "none", "is no folder")):
+        where = ("--config-dir", str(folder), f"outputs={outputs}", "split=mini")
+        code, _, err = command("eval", *where, "agent=random_walk", "baseline=gone")
+        assert code == 2
+        assert len(err) == 1
+        assert line in err[0]
