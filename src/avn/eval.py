@@ -21,7 +21,7 @@ def main(cfg: DictConfig) -> Path:
     films.check(cfg)
     run = Evaluation(cfg)
     run.check()
-    refuse_unread("eval", cfg, run.read())
+    refuse_unread("eval", cfg, run.read() | films.read(cfg))
     build(run, asked=True)
     folder = run.folder
     show_run(cfg, folder)

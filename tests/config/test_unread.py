@@ -79,6 +79,8 @@ def test_so_do_the_other_commands(command, tmp_path, arguments, key):
         ("agent=random_walk", "acoustics=diffraction"),  # a column of the records
         ("agent=random_walk", "sound=alarm"),
         ("agent=oracle", "protocol=stop", "protocol.radius=2"),
+        ("agent=ours_noexp", "mapper.visible_above=0.3"),
+        ("agent=greedy", "film=1", "renderer.camera.size=32"),  # which films show
     ],
 )
 def test_what_is_read_or_changes_nothing_is_taken(command, outputs, arguments):

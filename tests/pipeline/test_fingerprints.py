@@ -1,5 +1,6 @@
 """Which settings make which product anew: those that change it must, all others must not."""
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from avn.pipeline.policy import Policy
 from avn.pipeline.run import Evaluation
 from avn.pipeline.scenes import DirectSound, Geometry, LateReverberation
 from avn.pipeline.sound_network import SoundNetwork, SourceEstimates, hears
+from avn.pipeline.stage import missing
 from avn.pipeline.stop_classifier import StopNetwork, StopProbabilities
 from avn.pipeline.views import RenderedViews
 from avn.pipeline.visual_features import VisualEmbeddings
@@ -84,6 +86,7 @@ def moved(override):
         ("protocol.starts=5", RUN),
         ("mapper.top=2", RUN),
         ("planner.patience=5", RUN),
+        ("localisation=retrieval", RUN),
     ],
 )
 def test_how_an_agent_acts_is_no_part_of_what_it_learnt(override, wanted):
@@ -106,6 +109,7 @@ def test_how_an_agent_acts_is_no_part_of_what_it_learnt(override, wanted):
         ("backbone.size=64", {"embeddings", "run", "policy", "policy_map"}),
         ("a3c.gamma=0.9", {"policy", "policy_map"}),
         ("a3c.walks=3", NONE),  # neither explores
+        ("mapper.visible_above=0.2", {"run_windows", "policy_map"}),
         # the regimes share the reverberation
         ("acoustics=diffraction", {*DIRECT, "run_windows", "policy_map"}),
         ("acoustics.rays=500", {*SOUNDING, "run_windows", "policy_map"}),
@@ -180,6 +184,103 @@ def test_equal_worlds_share_their_sound_and_other_parts_share_no_views():
     assert DirectSound(cfg, test).paths == DirectSound(cfg, training).paths
     assert RenderedViews(cfg, test).paths == RenderedViews(cfg, training).paths
     assert RenderedViews(cfg, test).paths != RenderedViews(cfg, test, look=1).paths
+
+
+@pytest.mark.parametrize(
+    ("row", "override"),
+    [
+        (("agent=oracle", "episodes=exhaustive"), "protocol.starts=7"),
+        (("agent=oracle", "episodes=exhaustive"), "protocol.exploration=33"),
+        (("agent=greedy",), "baseline.slack=0.9"),
+        (("agent=ours_exp", "localisation=retrieval"), "mapper.sharpness=0.5"),
+        (("agent=ours_exp", "localisation=retrieval"), "mapper.confidence=0.9"),
+        (("agent=ours_noexp", "agent.truth=[location,window]"), "takes=2"),
+        (("agent=ours_noexp", "agent.truth=[location,window]"), "renderer.camera.size=64"),
+        (("agent=a3c_va",), "baseline.top=1"),
+    ],
+)
+def test_what_makes_no_difference_to_a_run_makes_none_anew(row, override):
+    one, other = (Evaluation(composed("split=mini", *row, *more)) for more in ((), (override,)))
+    assert one.fingerprint == other.fingerprint
+    assert override.split("=")[0] not in one.read()
+
+
+@pytest.mark.parametrize(
+    ("row", "override"),
+    [
+        (("agent=oracle",), "protocol.starts=7"),
+        (("agent=greedy", "protocol=stop"), "baseline.slack=0.9"),
+        (("agent=ours_exp",), "mapper.sharpness=0.5"),
+        (("agent=ours_exp", "planner.source=belief"), "planner.error.near=0.9"),
+        (("agent=ours_noexp", "agent.truth=[location,window]"), "renderer.camera.pitch=-20"),
+        (("agent=ours_noexp",), "mapper.visible_above=0.3"),
+        (("agent=ours_exp", "mapper.windows=true", "occupancy_model=small"),
+         "mapper.visible_above=0.3"),
+        (("agent=a3c_va",), "baseline.samples=false"),
+    ],
+)  # fmt: skip
+def test_what_makes_a_difference_to_a_run_is_read(row, override):
+    one, other = (Evaluation(composed("split=mini", *row, *more)) for more in ((), (override,)))
+    assert one.fingerprint != other.fingerprint
+    assert override.split("=")[0] in one.read()
+
+
+@pytest.mark.parametrize(
+    "override",
+    ["protocol.starts=5", "protocol.name=mine", "part=validation", "baseline.samples=false"],
+)
+def test_evaluations_choose_no_policy(override):
+    one, other = (
+        Policy(composed("agent=a3c_va_m", "split=mini", *more)) for more in ((), (override,))
+    )
+    assert one.fingerprint == other.fingerprint
+    assert override.split("=")[0] not in one.read()
+
+
+def test_two_rows_never_share_a_folder():
+    one, other = (
+        Policy(composed("agent=a3c_v", "split=mini", f"agent.name={name}")) for name in "ab"
+    )
+    assert one.folder != other.folder
+    assert one.fingerprint != other.fingerprint
+
+
+@pytest.mark.parametrize("kind", [SoundNetwork, StopNetwork])
+def test_the_acoustics_of_the_training_world_are_read_where_they_follow_the_test(kind):
+    read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini")).read()
+    assert {"acoustics.name", "acoustics.first_arrival", "acoustics.rays", "split.seed"} <= read
+    own = "+acoustics@training.acoustics=resonance"
+    read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini", own)).read()
+    assert not any(key.startswith("acoustics.") for key in read)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "line"),
+    [
+        (("agent=a3c_va_m", "episodes=exhaustive"), "have no exploration walk"),
+        (("agent=ours_exp", "protocol.exploration=0"), "have no exploration walk"),
+        (("agent=ours_noexp", "agent.truth=[pose]", "agent.privileged=true"), "'pose' is nothing"),
+        (("agent=ours_exp", "agent.truth=[map]", "agent.privileged=true"), "'map' is nothing"),
+        (("agent=ours_exp", "agent.truth=[window]", "agent.privileged=true"), "'window' is noth"),
+        (("agent=ours_noexp", "mapper.size=100"), "mapper.size: 100; give an odd number"),
+        (("agent=ours_noexp", "protocol=stop", "stop_model.criterion=foo"), "stop_model.criterion"),
+        (("agent=a3c_va_mapper", "baseline.map_width=20"), "baseline.map_width: 20"),
+        (("agent=greedy", "sound_model.epochs=0"), "epochs"),
+        (("agent=ours_noexp", "sound_model.schedule=foo"), "schedule"),
+        (("agent=ours_noexp", "occupancy_model.looks=0"), "occupancy_model.looks: 0"),
+        (("agent=greedy", "takes=0"), "takes: 0 is out of range"),
+    ],
+)
+def test_what_cannot_work_is_refused_before_anything_is_made(overrides, line, tmp_path):
+    run = Evaluation(composed("split=mini", f"outputs={tmp_path}", *overrides))
+
+    def plan():
+        run.check()
+        missing([run])
+
+    with pytest.raises(UserError, match=re.escape(line)):
+        plan()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_radius_is_another_goal():

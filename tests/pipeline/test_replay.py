@@ -7,7 +7,7 @@ import pytest
 import torch
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
-from small import A3C, EYES, SMALL, fitting
+from small import A3C, EYES, SMALL, composed, fitting
 
 from avn.config import saved
 from avn.config.folder import conf_folder
@@ -132,6 +132,30 @@ def test_what_is_chosen_is_typical_and_from_everywhere():
     assert replay.choose(episodes(), "typical", 0) == []
     with pytest.raises(UserError, match="--show: 'best' is none of typical, success, failure"):
         replay.choose(episodes(), "best", 1)
+
+
+def test_a_saved_training_world_is_read_back_as_it_was(tmp_path):
+    options = ["agent=greedy", "split=mini", "sound@training.sounds=ring"]
+    cfg = composed(*options)
+    (tmp_path / "config.yaml").write_text(OmegaConf.to_yaml(cfg, resolve=True))
+    again = read_config(tmp_path)
+    assert list(again.training.sounds) == ["ring"]
+    assert Evaluation(again).fingerprint == Evaluation(cfg).fingerprint
+
+
+def test_names_tell_what_a_setting_of_the_run_was_resolved_to(tmp_path):
+    runs = []
+    for seed, way in enumerate(("retrieval", "retrieval+odometry")):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        cfg = composed("agent=ours_exp", "split=mini", f"localisation={way}", "train_seed=1")
+        (folder / "config.yaml").write_text(OmegaConf.to_yaml(cfg, resolve=True))
+        frame = pd.DataFrame()
+        runs.append(replay.Run(folder, read_config(folder), frame, frame))
+    assert replay.names_of(runs) == [
+        "ours_exp, localisation=retrieval",
+        "ours_exp, localisation=retrieval+odometry",
+    ]
 
 
 def test_names_tell_runs_apart_by_what_differs(command, outputs):

@@ -60,6 +60,10 @@ class Agent(ABC):
         """Observations that it cannot do without under a protocol."""
         return self.needs
 
+    def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
+        """Settings of its own that make no difference under a protocol, by name."""
+        return ()
+
     def explore(self, walks: TensorDict, walk: Tensor) -> None:
         """Be shown exploration walks, after `reset` and before the first action.
 

@@ -54,6 +54,10 @@ class Greedy(Agent):
         super().reset(n, generator, protocol)
         self.turns = torch.zeros(n, dtype=torch.int64)
 
+    def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
+        """Where nobody says Stop, how far beyond the goal it would."""
+        return () if protocol.says_stop else ("slack",)
+
     def act(self, observation: TensorDict) -> Tensor:
         """One action for every episode, from the location heard now."""
         right, front = observation["sound"].unbind(dim=-1)

@@ -102,6 +102,10 @@ class PlannerAgent(Agent):
         for part in truth:
             if part not in TRUTH:
                 raise UserError(f"agent.truth: '{part}' is none of {', '.join(TRUTH)}")
+            if part in ("map", "pose") and part not in mapper.reveals:
+                raise UserError(
+                    f"agent.truth: '{part}' is nothing that {type(mapper).__name__} can be shown"
+                )
         if look not in LOOKS:
             raise UserError(f"look: '{look}' is none of {', '.join(LOOKS)}")
         self.mapper, self.look, self.source = mapper, look, source
@@ -117,6 +121,10 @@ class PlannerAgent(Agent):
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
         """What it has to observe; where it has to say Stop, whether it is within reach."""
         return (*self.needs, "reach") if protocol.says_stop else self.needs
+
+    def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
+        """Where the newest estimate counts alone, how far estimates are trusted."""
+        return ("error",) if self.source == "newest" else ()
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
         """Begin N new episodes."""

@@ -65,6 +65,9 @@ def _with_schema(group: str, node: DictConfig, default: DictConfig) -> DictConfi
     if not fitting:
         if OmegaConf.get_type(default) is dict:  # of names and paths, which are the file's alone
             return node
-        return OmegaConf.merge(default, node)  # type: ignore[return-value]
+        merged = OmegaConf.merge(default, node)
+        if group == "training":  # names and paths again
+            OmegaConf.update(merged, "sounds", node.sounds, merge=False)
+        return merged  # type: ignore[return-value]
     best = min(fitting, key=lambda own: (len(own), own._metadata.object_type.__name__))
     return OmegaConf.merge(best, node)  # type: ignore[return-value]

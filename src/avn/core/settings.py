@@ -56,24 +56,39 @@ def leaves(cfg: DictConfig, keys: Sequence[str], ignored: Sequence[str] = ()) ->
 
     Where `mapper.localisation` is `${localisation}`, reading the one is reading the other.
     """
-    return {leaf for key in keys for leaf in _leaves(cfg, key, set(ignored))}
+    hidden = set(ignored) - set(keys)
+    return {leaf for key in keys for leaf in _leaves(cfg, key, hidden)}
 
 
 def _leaves(cfg: DictConfig, key: str, ignored: set[str]) -> Iterator[str]:
     if key in ignored:
         return
-    parent, _, name = key.rpartition(".")
-    holder = OmegaConf.select(cfg, parent) if parent else cfg
-    if not isinstance(holder, DictConfig) or name not in holder:
-        return
-    if OmegaConf.is_interpolation(holder, name):
-        raw = str(OmegaConf.to_container(holder, resolve=False)[name])  # type: ignore[index,call-overload]
-        for other in _REFERENCE.findall(raw):
-            hidden = {f"{other}{own[len(key) :]}" for own in ignored if own.startswith(f"{key}.")}
-            yield from _leaves(cfg, other, hidden)
-    value = None if OmegaConf.is_missing(holder, name) else holder[name]
+    for other, hidden in _referred(cfg, key, ignored):
+        yield from _leaves(cfg, other, hidden)
+    value = OmegaConf.select(cfg, key)
     if isinstance(value, DictConfig):
         for child in map(str, value):
             yield from _leaves(cfg, f"{key}.{child}", ignored)
-    else:
+    elif _holds(cfg, key):
         yield key
+
+
+def _referred(cfg: DictConfig, key: str, ignored: set[str]) -> Iterator[tuple[str, set[str]]]:
+    """What a key refers to, itself or by a node that it lies in, and what is ignored there."""
+    parts = key.split(".")
+    for count in range(1, len(parts) + 1):
+        node = ".".join(parts[:count])
+        holder = OmegaConf.select(cfg, ".".join(parts[: count - 1])) if count > 1 else cfg
+        if not isinstance(holder, DictConfig) or parts[count - 1] not in holder:
+            return
+        if OmegaConf.is_interpolation(holder, parts[count - 1]):
+            raw: Any = OmegaConf.to_container(holder, resolve=False)
+            for other in _REFERENCE.findall(str(raw[parts[count - 1]])):
+                moved = {other + own[len(node) :] for own in ignored if own.startswith(f"{node}.")}
+                yield other + key[len(node) :], moved
+
+
+def _holds(cfg: DictConfig, key: str) -> bool:
+    parent, _, name = key.rpartition(".")
+    holder = OmegaConf.select(cfg, parent) if parent else cfg
+    return isinstance(holder, DictConfig) and name in holder

@@ -30,6 +30,8 @@ class Mapper(ABC):
         Column and row before they are rounded to a square.
     graph : PartialGraph
         Nodes and edges that the planner plans on.
+    reveals : tuple of str
+        Parts of the truth that it can be shown: `map`, `pose`.
     in_walk : bool
         Whether the map lies in the frame of the exploration walk, not in that of the start.
     retrieved : (N, k) float32 and (N, k, 3) int64 tensors, or None
@@ -37,12 +39,17 @@ class Mapper(ABC):
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
+    reveals: ClassVar[tuple[str, ...]] = ()
     explores: ClassVar[bool] = False
     pose: Tensor
     location: Tensor
     graph: PartialGraph
     in_walk: bool = False
     retrieved: tuple[Tensor, Tensor] | None = None
+
+    def unused_settings(self) -> tuple[str, ...]:
+        """Settings of its own that make no difference to it, by name."""
+        return ()
 
     @abstractmethod
     def reset(self, n: int, rules: GraphRules) -> None:

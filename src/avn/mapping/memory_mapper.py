@@ -73,6 +73,11 @@ class MemoryMapper(Mapper):
         self.edges, self.sharpness, self.confidence = edges, sharpness, confidence
         self.windows = windows
         self.needs = ("feature", "window") if windows else ("feature",)  # type: ignore[misc]
+        self.reveals = () if self.in_walk else ("pose",)  # type: ignore[misc]
+
+    def unused_settings(self) -> tuple[str, ...]:
+        """Those of the votes, where it goes by what it recognises alone."""
+        return ("sharpness", "confidence") if self.in_walk else ()
 
     def reset(self, n: int, rules: GraphRules) -> None:
         """Begin N new episodes; the walks come with `explore`."""

@@ -28,6 +28,7 @@ class OccupancyMapper(Mapper):
     """
 
     needs = ("window",)
+    reveals = ("map",)
 
     def __init__(self, size: int = 101) -> None:
         self.size = size

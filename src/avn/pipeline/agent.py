@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import torch
+from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from avn.agents.base import Agent
 from avn.core.errors import UserError
+from avn.mapping.base import Mapper
 from avn.modules.network import build_part
+from avn.modules.stop_classifier import check_decision
+from avn.navigation.protocols import Protocol
 from avn.pipeline import policy, stop_classifier
 from avn.pipeline.stage import Stage
 
@@ -83,11 +88,25 @@ def agent_settings(cfg: DictConfig) -> list[str]:
 def agent_ignored(cfg: DictConfig) -> list[str]:
     """Keys below those of `agent_settings` that make no difference to it."""
     unread = [f"mapper.{name}" for name in _OTHERS]
-    if "source" in cfg.planner and cfg.planner.source == "newest":
-        unread.append("planner.error")  # estimates are not weighed
+    agent, node = build_agent(cfg), "planner" if cfg.planner._target_ else "baseline"
+    protocol: Protocol = instantiate(cfg.protocol)
+    unread += [f"{node}.{name}" for name in agent.unused_settings(protocol)]
+    if cfg.planner._target_:
+        mapper: Mapper = build_part(_arguments(cfg.mapper))
+        unread += [f"mapper.{name}" for name in mapper.unused_settings()]
     if policy.learns(cfg):
-        unread += [key for key in policy.Policy(cfg).ignored() if key != "baseline.samples"]
+        acting = ("baseline.samples",)
+        own = [key for key in policy.Policy(cfg).ignored() if key.startswith("baseline.")]
+        unread += [key for key in own if key not in acting]
     return unread
+
+
+def check_agent(cfg: DictConfig, agent: Agent) -> None:
+    """Refuse what an agent would stumble over once it acts, such as the size of its map."""
+    if cfg.planner._target_:
+        agent.reset(1, torch.Generator(), instantiate(cfg.protocol))
+    if decides(cfg):
+        check_decision(cfg.stop_model.criterion, cfg.stop_model.threshold)
 
 
 def check_no_truth(cfg: DictConfig) -> None:

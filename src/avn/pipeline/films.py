@@ -9,8 +9,9 @@ from omegaconf import DictConfig
 from avn.core.errors import UserError
 from avn.core.files import check_name, locked
 from avn.core.progress import span, tell
+from avn.core.settings import leaves
 from avn.pipeline import replay
-from avn.pipeline.observed import Perceived, soundtrack
+from avn.pipeline.observed import Perceived, observed_stages, soundtrack
 from avn.pipeline.replay import Run
 from avn.pipeline.run import read_run
 from avn.reporting.film import write_film
@@ -25,6 +26,16 @@ def check(cfg: DictConfig) -> None:
         raise UserError(f"film: {cfg.film} is out of range; give how many, 0 to {MOST}")
     if cfg.film_show not in replay.SHOWS:
         raise UserError(f"film_show: '{cfg.film_show}' is none of {', '.join(replay.SHOWS)}")
+
+
+def read(cfg: DictConfig) -> set[str]:
+    """Leaf keys of the config that films read beyond what their run does."""
+    if not cfg.film:
+        return set()
+    stages = observed_stages(cfg)
+    for stage in stages:
+        stage.check()
+    return leaves(cfg, ["microphone"]).union(*(stage.read() for stage in stages))
 
 
 def make_films(cfg: DictConfig, folder: Path) -> list[Path]:

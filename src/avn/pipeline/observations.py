@@ -71,9 +71,8 @@ class Observation:
 
 def _true_estimates(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
     sounds = len(sound_files(apartments.cfg, apartments.world))
-    takes = apartments.cfg.takes
     return [
-        where_sources_are(scene)[0][:, :, None, None].expand(-1, -1, sounds, takes, -1)
+        where_sources_are(scene)[0][:, :, None, None].expand(-1, -1, sounds, -1, -1)
         for scene in scenes
     ]
 
@@ -94,7 +93,6 @@ OBSERVATIONS = {
         there=hears,
         truth="location",
         true=_true_estimates,
-        true_settings=("takes",),
     ),
     "reach": Observation(
         shape="(): probability that the source is within reach",
@@ -142,7 +140,7 @@ OBSERVATIONS = {
         truth="window",
         true=_true_patches,
         settings=("mapper.visible_above",),
-        true_settings=("renderer.camera",),
+        true_settings=tuple(f"renderer.camera.{own}" for own in ("height", "pitch", "fov")),
     ),
 }
 
@@ -185,6 +183,10 @@ class Observed:
             Who needs them, for the message.
         wanted : sequence of str
         """
+        for truth in self._truth:
+            shown = [name for name, own in OBSERVATIONS.items() if own.truth == truth]
+            if shown and not set(shown) & set(wanted):
+                raise UserError(f"agent.truth: '{truth}' is nothing that agent {agent} observes")
         for name in wanted:
             start = f"agent {agent} needs the observation '{name}'"
             if name not in (*OBSERVATIONS, *OWN):
@@ -231,4 +233,10 @@ class Observed:
                 tensors = own.load(stages[name])
             for (audio, visual), tensor in zip(observed, tensors, strict=True):
                 (audio if own.audio else visual)[name] = tensor
-        return [SceneObservations(*both) for both in observed]
+        return [SceneObservations(_alike(audio), visual) for audio, visual in observed]
+
+
+def _alike(audio: dict[str, Tensor]) -> dict[str, Tensor]:
+    """Audio observations with equal numbers of realisations; the truth has but one."""
+    most = max((own.shape[3] for own in audio.values()), default=1)
+    return {name: own.expand(*own.shape[:3], most, *own.shape[4:]) for name, own in audio.items()}

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from omegaconf import DictConfig
 from torch import Tensor
 
 from avn.acoustics.clips import CLIP_SAMPLES, FADE_SAMPLES, ClipRenderer, brir_spectra
@@ -25,6 +26,12 @@ from avn.pipeline.views import RenderedViews
 _BATCH = 64
 
 
+def observed_stages(cfg: DictConfig) -> tuple[DirectSound, RenderedViews]:
+    """What pictures and clips of a run are made from."""
+    apartments = Apartments(cfg, cfg.part)
+    return DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
+
+
 class Perceived:
     """Pictures and clips of a run's apartments, made where they are missing.
 
@@ -38,8 +45,7 @@ class Perceived:
 
     def __init__(self, run: Run) -> None:
         cfg = run.cfg
-        apartments = Apartments(cfg, cfg.part)
-        sound, rendered = DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
+        sound, rendered = observed_stages(cfg)
         build(sound)
         build(rendered)
         self._scenes = {scene.name: scene for scene in sound.load()}

@@ -8,7 +8,6 @@ from typing import Any
 
 import pandas as pd
 import torch
-from hydra.utils import instantiate
 from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig
 from torch import Tensor
@@ -23,6 +22,7 @@ from avn.core.settings import plain, typed
 from avn.datamodules.views import Seen, ViewData
 from avn.dataset.scene import Scene
 from avn.dataset.views import Views
+from avn.modules.network import build_part
 from avn.modules.occupancy_cnn import OccupancyCnn
 from avn.modules.window_metrics import calibrated, window_metrics
 from avn.pipeline.per_scene import ApartmentTensors
@@ -50,6 +50,11 @@ class OccupancyNetwork(Fitted):
         """Refuse a config that has no such network."""
         if not sees_windows(self.cfg):
             raise UserError("occupancy_model: 'none' sees no free cells; choose small or released")
+        if self.cfg.occupancy_model.looks < 1:
+            raise UserError(
+                f"occupancy_model.looks: {self.cfg.occupancy_model.looks}; give 1 or more"
+            )
+        super().check()
 
     def _views(self) -> list[RenderedViews]:
         looks = range(self.cfg.occupancy_model.looks)
@@ -80,7 +85,7 @@ class OccupancyNetwork(Fitted):
         """The network before training."""
         recipe = self.cfg.occupancy_model
         torch.manual_seed(recipe.train_seed)
-        model: OccupancyCnn = instantiate(recipe, camera=plain(self.cfg, "renderer.camera"))
+        model: OccupancyCnn = build_part(recipe, camera=plain(self.cfg, "renderer.camera"))
         return model
 
     def data(self) -> ViewData:

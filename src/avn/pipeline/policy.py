@@ -19,6 +19,7 @@ from avn.core.errors import UserError
 from avn.core.files import check_name
 from avn.core.settings import plain, typed
 from avn.dataset.scene import Scene
+from avn.mapping.ego_map import EgoMap
 from avn.navigation.episodes import frozen_episodes
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
@@ -76,6 +77,8 @@ class Policy(Trained):
         check_recipe(typed(self.cfg.a3c))
         if self.cfg.baseline.memory and not self.cfg.protocol.exploration:
             raise UserError("protocol.exploration: 0, and an agent with memory explores; give 400")
+        if sees_windows(self.cfg):
+            EgoMap(1, self.cfg.mapper.size, self.cfg.baseline.map_width)
 
     def needs(self) -> Sequence[Any]:
         """What it observes in the training and in the validation apartments."""
@@ -85,7 +88,8 @@ class Policy(Trained):
         """Its shape, the recipe, and the rules of the episodes."""
         maps = ("mapper.size",) if sees_windows(self.cfg) else ()
         shaped = observed(self.cfg, "train").settings
-        return ("baseline", "a3c", "protocol", *maps, *shaped)
+        # its name names the folder, so that two rows never share one
+        return ("agent.name", "baseline", "a3c", "protocol", *maps, *shaped)
 
     def ignored(self) -> Sequence[str]:
         """How it acts once it is trained, and what agents without memory or map have not."""
@@ -93,16 +97,15 @@ class Policy(Trained):
         radius = self.cfg.protocol.goal != "radius"
         return [
             "baseline.samples",
+            # of evaluations, and a label
+            "protocol.starts",
+            "protocol.name",
             *(() if memory else ("a3c.walks", "a3c.refresh")),
             *(() if maps else ("baseline.map_width",)),
             *(() if memory and maps else ("baseline.top",)),
             *(("protocol.radius",) if radius else ()),
             *(() if hears(self.cfg) else ("a3c.takes",)),
         ]
-
-    def consulted(self) -> Sequence[str]:
-        """The name of the row."""
-        return ("agent.name",)
 
     @property
     def title(self) -> str:
@@ -254,6 +257,7 @@ class Measure:
         found = {}
         given, options = parts(self._cfg), plain(self._cfg, "baseline")
         options.pop("_target_")
+        options["samples"] = True  # how it acts once it is trained chooses no network
         agent = ActorCriticAgent(network, **options, **given)
         for part, (rooms, observations) in self._observed.items():
             name = "training" if part == "train" else part

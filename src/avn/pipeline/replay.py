@@ -146,10 +146,10 @@ def names_of(runs: Sequence[Run]) -> list[str]:
     settings = [run.settings for run in runs]
     keys = [key for own in settings for key in own]
     keys = [key for key in dict.fromkeys(keys) if len(_values(key, settings)) > 1]
-    shown = [key for key in keys if key.split(".")[0] in _TELLING]
+    shown = {key: label for key in keys if (label := _label(key))}
     names = []
     for run, own in zip(runs, settings, strict=True):
-        parts = [f"{key.removesuffix('.name')}={own[key]}" for key in shown if key in own]
+        parts = dict.fromkeys(f"{shown[key]}={own[key]}" for key in shown if key in own)
         names.append(", ".join((str(run.cfg.agent.name), *parts)))
     if len(set(names)) < len(names):  # settings of networks or of rooms
         names = [f"{name} ({run.folder.name})" for name, run in zip(names, runs, strict=True)]
@@ -160,6 +160,15 @@ def settings_but_seed(run: Run) -> str:
     """All settings of a run that make its records, but for the seed of its episodes."""
     others = ("seed", *MACHINE, "film", "film_show")
     return repr([(key, value) for key, value in run.settings.items() if key not in others])
+
+
+def _label(key: str) -> str:
+    """What a setting is called in a name; empty where it is not told."""
+    first, last = key.split(".")[0], key.rsplit(".", 1)[-1]
+    if first in _TELLING:
+        return key.removesuffix(".name")
+    # a saved config holds what `look` and the like were resolved to
+    return last if last in ("look", "localisation", "train_seed") else ""
 
 
 def _values(key: str, settings: Sequence[Mapping[str, str]]) -> set[str]:

@@ -21,7 +21,13 @@ from avn.navigation.exploration import EXPLORATIONS
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.pipeline import perception_tables
-from avn.pipeline.agent import agent_ignored, agent_settings, agent_stages, build_agent
+from avn.pipeline.agent import (
+    agent_ignored,
+    agent_settings,
+    agent_stages,
+    build_agent,
+    check_agent,
+)
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork
@@ -92,7 +98,9 @@ class Evaluation(Stage):
     def ignored(self) -> Sequence[str]:
         """What makes no difference to this agent under these rules."""
         radius = () if self.cfg.protocol.goal == "radius" else ("protocol.radius",)
-        return (*agent_ignored(self.cfg), *radius)
+        frozen = self.cfg.episodes == "frozen"
+        lists = () if frozen else ("protocol.starts", "protocol.exploration")
+        return (*agent_ignored(self.cfg), *radius, *lists)
 
     @property
     def _walks_first(self) -> bool:
@@ -144,6 +152,12 @@ class Evaluation(Stage):
                 f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
             )
         self.observed.check(type(agent).__name__, agent.wants(instantiate(cfg.protocol)))
+        if agent.explores and not self._walks_first:
+            raise UserError(
+                f"episodes: agent {type(agent).__name__} explores first, and these episodes have "
+                "no exploration walk; take episodes=frozen and protocol.exploration=400"
+            )
+        check_agent(cfg, agent)
         dry_sounds(cfg)  # a bad file is refused before anything is made
 
     def done(self) -> bool:

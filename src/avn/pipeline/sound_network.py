@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import torch
-from hydra.utils import instantiate
 from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig
 
 from avn.datamodules.sound import SoundData
+from avn.modules.network import build_part
 from avn.modules.sound_cnn import SoundCnn
 from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.trained_on_clips import TrainedOnClips
@@ -37,7 +37,7 @@ class SoundNetwork(TrainedOnClips):
     def untrained(self) -> SoundCnn:
         """The network before training."""
         torch.manual_seed(self.cfg.sound_model.train_seed)
-        model: SoundCnn = instantiate(self.cfg.sound_model)
+        model: SoundCnn = build_part(self.cfg.sound_model)
         return model
 
     def data(self) -> SoundData:

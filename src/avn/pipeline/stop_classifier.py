@@ -12,6 +12,7 @@ from omegaconf import DictConfig
 
 from avn.core.progress import progress_bar
 from avn.datamodules.stop import StopData
+from avn.modules.network import build_part
 from avn.modules.stop_classifier import StopClassifier, check_decision
 from avn.modules.stop_metrics import CRITERIA, StopScores, best_threshold
 from avn.navigation.protocols import Protocol
@@ -56,7 +57,7 @@ class StopNetwork(TrainedOnClips):
 
     def untrained(self) -> StopClassifier:
         """The network before training."""
-        model: StopClassifier = instantiate(self.cfg.stop_model)
+        model: StopClassifier = build_part(self.cfg.stop_model)
         return model
 
     def data(self) -> StopData:

@@ -100,6 +100,10 @@ class Fitted(Trained):
     def data(self) -> L.LightningDataModule:
         """What it is trained on."""
 
+    def check(self) -> None:
+        """Refuse a recipe that cannot work."""
+        self.untrained()
+
     def measure(self, model: Any, data: Any) -> dict[str, Any]:
         """Metrics of the trained network beside those of the training."""
         return {}

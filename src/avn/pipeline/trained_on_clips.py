@@ -31,6 +31,7 @@ class TrainedOnClips(Fitted):
         """Refuse a config that has no such network."""
         if self.cfg[self.node].name == "none":
             raise UserError(self.without)
+        super().check()
 
     def needs(self) -> Sequence[DirectSound]:
         """The sound of the training and validation apartments."""
