@@ -136,10 +136,10 @@ def test_what_is_chosen_is_typical_and_from_everywhere():
 
 def test_a_saved_training_world_is_read_back_as_it_was(tmp_path):
     options = ["agent=greedy", "split=mini", "sound@training.sounds=ring"]
-    cfg = composed(*options)
+    cfg = composed(*options, "+training.sounds.mine=clock", "~training.sounds.ring")
     (tmp_path / "config.yaml").write_text(OmegaConf.to_yaml(cfg, resolve=True))
     again = read_config(tmp_path)
-    assert list(again.training.sounds) == ["ring"]
+    assert dict(again.training.sounds) == {"mine": "clock"}
     assert Evaluation(again).fingerprint == Evaluation(cfg).fingerprint
 
 

@@ -57,17 +57,25 @@ def _with_schema(group: str, node: DictConfig, default: DictConfig) -> DictConfi
     """A group's node with that of its schemas that fits it best: the fewest keys it has not."""
     if is_foreign(group, node):
         return with_signature(group, node)
-    if group == "training" and is_foreign("microphone", node.get("microphone")):
-        node.microphone = with_signature("microphone", node.microphone)
+    if group == "training":
+        return _training(node, default)
     found = [schema for (own, _), schema in schema.SCHEMAS.items() if own == group]
     nodes = [OmegaConf.structured(schema) for schema in found]
     fitting = [own for own in nodes if set(map(str, node)) <= set(map(str, own))]
     if not fitting:
         if OmegaConf.get_type(default) is dict:  # of names and paths, which are the file's alone
             return node
-        merged = OmegaConf.merge(default, node)
-        if group == "training":  # names and paths again
-            OmegaConf.update(merged, "sounds", node.sounds, merge=False)
-        return merged  # type: ignore[return-value]
+        return OmegaConf.merge(default, node)  # type: ignore[return-value]
     best = min(fitting, key=lambda own: (len(own), own._metadata.object_type.__name__))
     return OmegaConf.merge(best, node)  # type: ignore[return-value]
+
+
+def _training(node: DictConfig, default: DictConfig) -> DictConfig:
+    """The node of the training world; its sounds are the file's alone."""
+    own = node.copy()
+    if is_foreign("microphone", own.get("microphone")):
+        own.microphone = with_signature("microphone", own.microphone)
+    sounds = own.pop("sounds", default.sounds)
+    merged = OmegaConf.merge(default, own)
+    OmegaConf.update(merged, "sounds", sounds, merge=False)
+    return merged  # type: ignore[return-value]
