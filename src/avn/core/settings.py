@@ -60,23 +60,26 @@ def leaves(cfg: DictConfig, keys: Sequence[str], ignored: Sequence[str] = ()) ->
     return {leaf for key in keys for leaf in _leaves(cfg, key, hidden)}
 
 
-def _leaves(cfg: DictConfig, key: str, ignored: set[str]) -> Iterator[str]:
+def _leaves(cfg: DictConfig, key: str, ignored: set[str], below: bool = False) -> Iterator[str]:
+    # `below`: the node that the key lies in has been looked at
     if key in ignored:
         return
-    for other, hidden in _referred(cfg, key, ignored):
+    for other, hidden in _referred(cfg, key, ignored, below):
         yield from _leaves(cfg, other, hidden)
     value = OmegaConf.select(cfg, key)
     if isinstance(value, DictConfig):
         for child in map(str, value):
-            yield from _leaves(cfg, f"{key}.{child}", ignored)
-    elif _holds(cfg, key):
+            yield from _leaves(cfg, f"{key}.{child}", ignored, below=True)
+    elif below or _holds(cfg, key):
         yield key
 
 
-def _referred(cfg: DictConfig, key: str, ignored: set[str]) -> Iterator[tuple[str, set[str]]]:
+def _referred(
+    cfg: DictConfig, key: str, ignored: set[str], last: bool
+) -> Iterator[tuple[str, set[str]]]:
     """What a key refers to, itself or by a node that it lies in, and what is ignored there."""
     parts = key.split(".")
-    for count in range(1, len(parts) + 1):
+    for count in range(len(parts) if last else 1, len(parts) + 1):
         node = ".".join(parts[:count])
         holder = OmegaConf.select(cfg, ".".join(parts[: count - 1])) if count > 1 else cfg
         if not isinstance(holder, DictConfig) or parts[count - 1] not in holder:

@@ -108,6 +108,7 @@ def apartments_of_every_part(cfg: DictConfig, world: World = TEST) -> list[Apart
 
 _READ: dict[str, dict[str, list[FloorPlan]]] = {}
 _CELLS: dict[str, int] = {}
+_HASHES: dict[int, tuple[FloorPlan, str]] = {}
 
 
 def _plans(split: DictConfig) -> dict[str, list[FloorPlan]]:
@@ -118,9 +119,16 @@ def _plans(split: DictConfig) -> dict[str, list[FloorPlan]]:
     return _READ[key]
 
 
+def plan_hash(plan: FloorPlan) -> str:
+    """SHA-256, in hex, of a floor plan."""
+    if id(plan) not in _HASHES:
+        _HASHES[id(plan)] = (plan, digest(plan.to_dict()))  # the plan, so that its id stays its own
+    return _HASHES[id(plan)][1]
+
+
 def cells_of(plan: FloorPlan) -> int:
     """How many free cells an apartment has."""
-    key = digest(plan.to_dict())
+    key = plan_hash(plan)
     if key not in _CELLS:
         _CELLS[key] = build_grid(plan).cells
     return _CELLS[key]
@@ -154,7 +162,7 @@ class PerApartment(Stage):
     @cached_property
     def fingerprints(self) -> list[str]:
         """The fingerprint of each apartment's file."""
-        plans, needs = self.apartments.plans, self.needs()
+        plans, needs = self.apartments.plans, self.needed
         own = values(self.cfg, self.settings(), self.ignored())
         return [
             digest(
@@ -210,7 +218,7 @@ def scene_folder(cfg: DictConfig, plan: FloorPlan) -> Path:
     """The folder of an apartment: `outputs/generate/<apartment>-<hash8 of its floor plan>`."""
     if not cfg.outputs:
         raise UserError("outputs: empty; give the path of a folder")
-    return Path(cfg.outputs) / "generate" / f"{plan.name}-{digest(plan.to_dict())[:8]}"
+    return Path(cfg.outputs) / "generate" / f"{plan.name}-{plan_hash(plan)[:8]}"
 
 
 def check_processes(cfg: DictConfig) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import torch
@@ -42,6 +43,11 @@ class AudioEmbeddings(AudioInference):
         if self.clips != Clips() or not self.cfg.sound_model.get("symmetric"):
             return ()
         return (SourceEstimates(self.cfg, self.apartments),)
+
+    def locks(self) -> Sequence[Path]:
+        """The files that are missing, those of the by-product included."""
+        others = [path for stage in self.by_products() for path in stage.locks()]
+        return sorted([*super().locks(), *others])
 
     def opened(self) -> Callable[[int], Tensor]:
         """Open the network and the scenes, and give what listens in one of them."""

@@ -13,7 +13,13 @@ from avn.core.files import check_name
 from avn.core.settings import typed
 from avn.dataset import build
 from avn.dataset.scene import AudibleScene, Brirs, Scene, load_scene
-from avn.pipeline.apartments import Apartments, PerApartment, check_processes, scene_folder
+from avn.pipeline.apartments import (
+    Apartments,
+    PerApartment,
+    check_processes,
+    plan_hash,
+    scene_folder,
+)
 
 # Settings of an acoustic regime; all others shape the reverberation, which regimes share.
 _REGIME = ("name", "first_arrival")
@@ -40,7 +46,7 @@ class Geometry(PerApartment):
 
     def content_of(self, plan: FloorPlan) -> Any:
         """The floor plan."""
-        return plan.to_dict()
+        return plan_hash(plan)
 
     @property
     def title(self) -> str:

@@ -120,10 +120,15 @@ class Stage(ABC):
     # What follows.
 
     @cached_property
+    def needed(self) -> tuple[Stage, ...]:
+        """What `needs` says, asked once."""
+        return tuple(self.needs())
+
+    @cached_property
     def fingerprint(self) -> str:
         """SHA-256, in hex, of all that the product depends on."""
         own = values(self.cfg, self.settings(), self.ignored())
-        needed = [need.fingerprint for need in self.needs()]
+        needed = [need.fingerprint for need in self.needed]
         return digest(self.kind, self.version, own, self.content(), needed)
 
     def locks(self) -> Sequence[Path]:
@@ -132,8 +137,19 @@ class Stage(ABC):
 
     def read(self) -> set[str]:
         """Leaf keys of the config that this stage and all that it needs read."""
-        own = leaves(self.cfg, (*MACHINE, *self.settings(), *self.consulted()), self.ignored())
-        return own.union(*(need.read() for need in self.needs()))
+        every: dict[str, Stage] = {}
+        left: list[Stage] = [self]
+        while left:
+            stage = left.pop()
+            if stage.fingerprint not in every:
+                every[stage.fingerprint] = stage
+                left.extend(stage.needed)
+        return set().union(*(stage.read_here() for stage in every.values()))
+
+    def read_here(self) -> set[str]:
+        """Leaf keys of the config that this stage reads, without what it needs."""
+        keys = (*MACHINE, *self.settings(), *self.consulted())
+        return leaves(self.cfg, keys, self.ignored())
 
 
 def missing(stages: Iterable[Stage]) -> list[Stage]:
@@ -161,7 +177,7 @@ def _ordered(stages: Iterable[Stage], instead: Mapping[str, Stage]) -> list[Stag
         if stage.fingerprint in found or stage.done():
             return
         stage.check()
-        for need in stage.needs():
+        for need in stage.needed:
             collect(need)
         found[stage.fingerprint] = stage
 

@@ -18,6 +18,7 @@ from avn.pipeline.apartments import (
     PerApartment,
     cells_of,
     check_processes,
+    plan_hash,
     scene_folder,
 )
 from avn.views.models import assets_hash
@@ -51,7 +52,7 @@ class RenderedViews(PerApartment):
 
     def content_of(self, plan: FloorPlan) -> Any:
         """The floor plan."""
-        return plan.to_dict()
+        return plan_hash(plan)
 
     @property
     def title(self) -> str:
