@@ -9,9 +9,10 @@ from small import SMALL, fitting
 
 
 def run(command, outputs, *more):
-    return command(
-        "eval", "agent=greedy", *fitting("agent=greedy", *SMALL), f"outputs={outputs}", *more
-    )
+    # a run of greedy reads no renderer, but its films do
+    own = [key for key in SMALL if key.startswith("renderer.") and any("film=" in o for o in more)]
+    settings = (*fitting("agent=greedy", *SMALL), *own, *more)
+    return command("eval", "agent=greedy", *settings, f"outputs={outputs}")
 
 
 def test_films_of_what_is_asked_for_lie_in_the_run_and_change_nothing(command, outputs):
@@ -37,6 +38,11 @@ def test_films_of_what_is_asked_for_lie_in_the_run_and_change_nothing(command, o
     assert code == 0
     assert film.stat().st_mtime_ns == stamp
     assert str(film) in out
+    # of other views it is made anew
+    code, out, _ = run(command, outputs, "film=1", f"film_show={word}", "renderer.camera.pitch=0")
+    assert code == 0
+    assert Path(out[-1]) == folder
+    assert film.stat().st_mtime_ns != stamp
 
 
 @pytest.mark.parametrize(

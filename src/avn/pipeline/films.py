@@ -7,9 +7,10 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from avn.core.errors import UserError
-from avn.core.files import check_name, locked
+from avn.core.files import check_name, locked, written_whole
+from avn.core.hashing import digest
 from avn.core.progress import span, tell
-from avn.core.settings import leaves
+from avn.core.settings import leaves, plain
 from avn.pipeline import replay
 from avn.pipeline.observed import Perceived, observed_stages, soundtrack
 from avn.pipeline.replay import Run
@@ -17,6 +18,8 @@ from avn.pipeline.run import read_run
 from avn.reporting.film import write_film
 
 FOLDER = "films"
+# Holds the fingerprint of what the films of a folder were made from.
+_MARK = ".made_from"
 MOST = 1000
 
 
@@ -39,7 +42,9 @@ def read(cfg: DictConfig) -> set[str]:
 
 
 def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
-    """Write up to `film` films of a finished run; those that are there stay as they are.
+    """Write up to `film` films of a finished run.
+
+    Those that are there stay as they are, unless views or microphone are others now.
 
     Parameters
     ----------
@@ -60,15 +65,34 @@ def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
     if not labels:
         tell(f"film_show: the run has no episode that is a {cfg.film_show}")
     paths = {label: folder / FOLDER / _name(run, label) for label in labels}
-    missing = [label for label in labels if not paths[label].is_file()]
-    if missing:
-        what = "film" if len(missing) == 1 else f"{len(missing)} films"
-        tell(f"{what} of '{cfg.agent.name}' missing: making (about {span(15.0 * len(missing))})")
-        with locked(folder / FOLDER, what):
-            _write(run, {label: paths[label] for label in missing})
+    if labels:
+        with locked(folder / FOLDER, "films"):
+            _make_missing(run, paths)
     for path in paths.values():
         tell(str(path))
     return list(paths.values())
+
+
+def _make_missing(run: Run, paths: dict[int, Path]) -> None:
+    """Write the films that are not there, or were made of other views or another microphone."""
+    mark, made_from = run.folder / FOLDER / _MARK, _fingerprint(run.cfg)
+    if not (mark.is_file() and mark.read_text() == made_from):
+        for old in (run.folder / FOLDER).glob("*.mp4"):
+            old.unlink()
+        with written_whole(mark) as part:
+            part.write_text(made_from)
+    missing = {label: path for label, path in paths.items() if not path.is_file()}
+    if missing:
+        what = "film" if len(missing) == 1 else f"{len(missing)} films"
+        name = run.cfg.agent.name
+        tell(f"{what} of '{name}' missing: making (about {span(15.0 * len(missing))})")
+        _write(run, missing)
+
+
+def _fingerprint(cfg: DictConfig) -> str:
+    """What films depend on besides the run itself."""
+    stages = [stage.fingerprint for stage in observed_stages(cfg)]
+    return digest(stages, plain(cfg, "microphone"))
 
 
 def _name(run: Run, label: int) -> str:
