@@ -208,12 +208,11 @@ class Observed:
     @property
     def settings(self) -> tuple[str, ...]:
         """Keys of the config that shape the observations beyond their stages."""
-        keys = [
-            own.true_settings if self.is_true(name) else own.settings
-            for name in self.names
-            for own in (OBSERVATIONS[name],)
-        ]
-        return tuple(dict.fromkeys(key for own in keys for key in own))
+        keys: list[str] = []
+        for name in self.names:
+            own = OBSERVATIONS[name]
+            keys += own.true_settings if self.is_true(name) else own.settings
+        return tuple(dict.fromkeys(keys))
 
     def load(self, scenes: Sequence[Scene]) -> list[SceneObservations]:
         """Read all observations.
