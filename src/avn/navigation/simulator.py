@@ -71,7 +71,9 @@ class Simulator:
         if observed.sounds not in (None, sounds):
             raise ValueError(f"clips of {observed.sounds} sounds, but episodes of {sounds}")
         self.tables = build_tables([place], protocol, [observed], sounds)
-        moves = self.tables.moves[self.tables.goal_row[self.source] + self.start]
+        self._goal_row = self.tables.goal_row[self.source]
+        self._origin = self.tables.origin(self.start)
+        moves = self.tables.moves[self._goal_row + self.start]
         self.max_attempts = protocol.most_moves(moves)
         self._realisations = self._drawn()
         self.reset()
@@ -117,7 +119,7 @@ class Simulator:
         """
         self._check(actions)
         running = ~self.done
-        reached, blocked, arrived = advance(self.tables, self.source, self.state, actions)
+        reached, blocked, arrived = advance(self.tables, self._goal_row, self.state, actions)
         self.state = torch.where(running, reached, self.state)
         self.attempted += (actions <= BACKWARD) & running
         self.collisions += blocked & running
@@ -141,7 +143,7 @@ class Simulator:
             int64, cells to the right and to the front and quarter turns clockwise since the start,
             in the frame of the start; and what is heard and seen, by name.
         """
-        odometry = self.tables.odometry(self.start, self.state)
+        odometry = self.tables.odometry(self.start, self.state, self._origin)
         observation = {"collided": self._collided.clone(), "odometry": odometry}
         if self.tables.audio:
             clip = self.tables.clip(self.clip())

@@ -87,8 +87,21 @@ class Tables:
         first = self.clip_row[clip.source] + clip.state * self.clips_of_state
         return first + clip.sound * self.realisations + clip.realisation
 
-    def odometry(self, start: Tensor, state: Tensor) -> Tensor:
+    def origin(self, start: Tensor) -> tuple[Tensor, Tensor]:
+        """The rows of `places` as seen from starts begin here, and the places of the starts."""
+        frame = start % HEADINGS * self.states
+        return frame, self.places[frame + start]
+
+    def odometry(
+        self, start: Tensor, state: Tensor, origin: tuple[Tensor, Tensor] | None = None
+    ) -> Tensor:
         """How states lie as seen from starts, which broadcast against them.
+
+        Parameters
+        ----------
+        start, state : int64 tensors
+        origin : (Tensor, Tensor), optional
+            What `origin` gave for the starts, to save looking it up at every step.
 
         Returns
         -------
@@ -96,8 +109,8 @@ class Tables:
             Cells to the right and to the front and quarter turns clockwise, in the frame of the
             start.
         """
-        frame = start % HEADINGS * self.states
-        return self.places[frame + state] - self.places[frame + start]
+        frame, begin = origin or self.origin(start)
+        return self.places[frame + state] - begin
 
     def share(self) -> Tables:
         """Move all tensors to shared memory; returns itself."""
@@ -109,15 +122,15 @@ class Tables:
 
 
 def advance(
-    tables: Tables, source: Tensor, state: Tensor, action: Tensor
+    tables: Tables, goal_row: Tensor, state: Tensor, action: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Move N agents by one action: the one rule of motion, for evaluation and for training.
 
     Parameters
     ----------
     tables : Tables
-    source, state : (N,) int64
-        What each agent seeks, and where it is.
+    goal_row, state : (N,) int64
+        `tables.goal_row` of the source that each agent seeks, and where it is.
     action : (N,) int64
         See `avn.core.actions`.
 
@@ -132,7 +145,7 @@ def advance(
     """
     following = tables.following[state * ACTIONS + action]
     blocked = (action <= BACKWARD) & (following == state)
-    return following, blocked, tables.goal[tables.goal_row[source] + following]
+    return following, blocked, tables.goal[goal_row + following]
 
 
 def build_tables(

@@ -96,7 +96,7 @@ class World:
         terminated, truncated : (N,) bool
             Whether the episode ended by itself, or was cut off.
         """
-        found = advance(self.tables, self.source, self.state, actions)
+        found = advance(self.tables, self.tables.goal_row[self.source], self.state, actions)
         self.state, self.collided, arrived = found
         self.actions = self.actions + 1
         self.attempted = self.attempted + (actions <= BACKWARD)
