@@ -4,17 +4,13 @@ import json
 import shutil
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
 import soundfile
-import torch
-from small import composed, fitting
+from small import fitting
 
 from avn.apartments.splits import FROZEN
-from avn.pipeline.apartments import Apartments
-from avn.pipeline.scenes import DirectSound
 from avn.reporting.results import read_csv
 
 SMALL = (
@@ -164,63 +160,6 @@ def test_a_bad_sound_file_is_one_line(command, outputs, tmp_path, content, said)
     assert said in err[0]
 
 
-def _cut(path):
-    path.write_bytes(path.read_bytes()[:-100])
-
-
-def _flip(path):
-    with path.open("r+b") as file:
-        file.seek(path.stat().st_size // 2)
-        byte = file.read(1)[0]
-        file.seek(-1, 1)
-        file.write(bytes([byte ^ 1]))
-
-
-def _other_version(path):
-    with h5py.File(path, "r+") as file:
-        file.attrs["version"] = 77
-
-
-@pytest.mark.parametrize(
-    ("spoil", "said"),
-    [(_cut, "cut short"), (_flip, "changed"), (_other_version, "format version 77")],
-)
-@pytest.mark.parametrize("name", ["geometry", "acoustics-tail", "acoustics-resonance"])
-def test_a_spoilt_scene_file_is_one_line_and_is_left_as_it_is(
-    command, outputs, tmp_path, name, spoil, said
-):
-    mine = copy(command, outputs, tmp_path)
-    shutil.rmtree(mine / "eval")
-    shutil.rmtree(mine / "hear")
-    room = composed("agent=greedy", *SMALL)
-    sound = DirectSound(room, Apartments(room, "test"))
-    (path,) = (mine / sound.paths[0].relative_to("outputs")).parent.glob(f"{name}-*.h5")
-    spoil(path)
-    content = path.read_bytes()
-    code, _, err = run_greedy(command, mine, "sound=alarm")
-    assert code == 2
-    lines = [line for line in err if line.startswith("avn.eval")]
-    assert len(lines) == 1
-    assert str(path) in lines[0]
-    assert said in lines[0]
-    assert path.read_bytes() == content
-    assert not list(mine.rglob("results.csv"))
-
-
-def test_a_checkpoint_of_another_config_is_one_line(command, outputs, tmp_path):
-    mine = copy(command, outputs, tmp_path)
-    (folder,) = (p for p in (mine / "train").iterdir() if p.is_dir())
-    checkpoint = torch.load(folder / "best.ckpt", weights_only=True)
-    checkpoint["hyper_parameters"]["batch"] = 7
-    torch.save(checkpoint, folder / "best.ckpt")
-    shutil.rmtree(mine / "hear")
-    shutil.rmtree(mine / "eval")
-    code, _, err = run_greedy(command, mine, "sound=alarm")
-    assert code == 2
-    assert str(folder / "best.ckpt") in err[-1]
-    assert "sound_model.batch" in err[-1]
-
-
 def test_a_split_without_a_test_apartment_is_one_line(command, outputs):
     code, _, err = command(
         "eval", "agent=oracle", "split=mini", "split.test=0", f"outputs={outputs}"
@@ -315,31 +254,6 @@ def test_sounds_may_be_a_list_with_paths(command, outputs, tmp_path):
     assert code == 0, err
     sounds = set(read_csv(Path(out[-1]) / "results.csv")["sound"])
     assert sounds == {"ring", "440", "nan", "all"}
-
-
-@pytest.mark.parametrize("name", ["episodes.csv", "results.csv"])
-@pytest.mark.parametrize("spoil", [_cut, lambda path: path.write_text("")], ids=["cut", "empty"])
-def test_a_damaged_run_is_one_line(command, outputs, tmp_path, name, spoil):
-    _, out, _ = run_greedy(command, outputs, "sound=alarm")
-    mine = copy(command, outputs, tmp_path)
-    folder = mine / Path(out[-1]).relative_to(outputs)
-    spoil(folder / name)
-    code, _, err = run_greedy(command, mine, "sound=alarm")
-    assert code == 2
-    assert str(folder) in err[-1]
-    assert "damaged; delete the folder" in err[-1]
-
-
-def test_a_bit_of_a_checkpoint_that_flipped_is_one_line(command, outputs, tmp_path):
-    mine = copy(command, outputs, tmp_path)
-    shutil.rmtree(mine / "hear")
-    shutil.rmtree(mine / "eval")
-    (path,) = mine.glob("train/*/best.ckpt")
-    _flip(path)
-    code, _, err = run_greedy(command, mine, "sound=alarm")
-    assert code == 2
-    assert str(path) in err[-1]
-    assert "to train again" in err[-1]
 
 
 def test_a_refused_run_leaves_nothing_behind(command, tmp_path):

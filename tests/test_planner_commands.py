@@ -5,36 +5,20 @@ from pathlib import Path
 import h5py
 import pandas as pd
 import pytest
-from small import fitting
+from small import EYES, SMALL, fitting
 
-SMALL = (
-    "split=mini",
-    "processes=1",
-    "acoustics.rays=300",
-    "acoustics.seconds=0.2",
-    "sound_model.epochs=1",
+# One take of each clip of one sound.
+WORLD = (
+    *(own for own in SMALL if not own.startswith(("sound=", "takes="))),
     "stop_model.epochs=1",
     "takes=1",
-    "protocol.starts=4",
-    "renderer.camera.size=32",
-    "renderer.samples=1",
-    "renderer.light.gather_rays=4",
-    "renderer.light.shadow_rays=2",
-    "renderer.light.spacing=0.3",
-    "backbone.size=32",
     "sound=alarm",
-)
-EYES = (
-    "occupancy_model.epochs=1",
-    "occupancy_model.looks=1",
-    "occupancy_model.times=1",
-    "occupancy_model.validation_views=40",
 )
 
 
 def ours(command, outputs, *more):
     agent, *others = more
-    settings = fitting((agent, *others), *SMALL, *EYES)
+    settings = fitting((agent, *others), *WORLD, *EYES)
     return command("eval", agent, *settings, f"outputs={outputs}", *others)
 
 
@@ -127,7 +111,7 @@ def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
     ],
 )
 def test_a_mistake_is_one_line(command, outputs, options, said):
-    settings = fitting(options[0], *SMALL, *EYES)
+    settings = fitting(options[0], *WORLD, *EYES)
     code, _, err = command("eval", *settings, f"outputs={outputs}", *options)
     assert code == 2
     assert said in err[-1]
@@ -135,7 +119,7 @@ def test_a_mistake_is_one_line(command, outputs, options, said):
 
 
 def test_views_that_are_missing_are_refused_with_auto_false(command, tmp_path):
-    settings = fitting("agent=ours_exp", *SMALL)
+    settings = fitting("agent=ours_exp", *WORLD)
     code, _, err = command("eval", *settings, "agent=ours_exp", f"outputs={tmp_path}", "auto=false")
     assert code == 2
     assert "is missing and auto=false" in err[-1]

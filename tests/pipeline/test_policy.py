@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from small import fitting
+from small import EYES, SMALL, fitting
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from avn.pipeline.trained import METRICS
@@ -13,28 +13,8 @@ from avn.reporting.model_card import CARD
 from avn.rl.a3c import BEST, CURVE, LAST
 
 ROWS = ("a3c_v", "a3c_va", "a3c_va_mapper", "a3c_va_m", "a3c_va_m_mapper")
-# The world of tests/test_planner_commands.py, so that stages are shared.
-WORLD = (
-    "split=mini",
-    "processes=1",
-    "acoustics.rays=300",
-    "acoustics.seconds=0.2",
-    "sound_model.epochs=1",
-    "takes=1",
-    "protocol.starts=4",
-    "renderer.camera.size=32",
-    "renderer.samples=1",
-    "renderer.light.gather_rays=4",
-    "renderer.light.shadow_rays=2",
-    "renderer.light.spacing=0.3",
-    "backbone.size=32",
-)
-EYES = (
-    "occupancy_model.epochs=1",
-    "occupancy_model.looks=1",
-    "occupancy_model.times=1",
-    "occupancy_model.validation_views=40",
-)
+# One take of each clip, and sounds that the tests name.
+WORLD = (*(own for own in SMALL if not own.startswith(("sound=", "takes="))), "takes=1")
 RECIPE = (
     "protocol.exploration=30",
     "a3c.workers=1",
