@@ -27,9 +27,9 @@ import pyroomacoustics as pra
 from numpy.typing import NDArray
 
 from avn.acoustics import materials
-from avn.acoustics.brir import AcousticsConfig, render_first_arrivals, render_source
+from avn.acoustics.brir import AcousticsConfig, render_direct_paths, render_source
 from avn.acoustics.decay import reverberation_time
-from avn.acoustics.first_arrival import band_energies, find_paths
+from avn.acoustics.direct_path import band_energies, find_paths
 from avn.acoustics.tracer import trace
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.generator import generate
@@ -81,14 +81,14 @@ def run_ours(plan: FloorPlan, every: int, scattered: bool) -> Outcome:
     render_source(surfaces, source, ears[:4], config)  # compiles, or loads what is compiled
     begin = time.process_time()
     render_source(surfaces, source, ears, config)
-    render_first_arrivals(walls(plan), source, ears, config)
+    render_direct_paths(walls(plan), source, ears, config)
     taken, memory = time.process_time() - begin, peak_megabytes()
     chosen = ears[::every]
     scattering = None if scattered else np.zeros((len(surfaces.materials), 6))
     events = trace(
         surfaces, source, chosen, rays=40000, seconds=SECONDS, air=False, scattering=scattering
     )
-    direct = band_energies(find_paths("through_walls", walls(plan), source, chosen))
+    direct = band_energies(find_paths("transmission", walls(plan), source, chosen))
     histograms = events.histogram(STEP)
     energy = histograms.sum(axis=1) + direct * seen[::every, None]
     decays = decay_times(histograms, STEP)

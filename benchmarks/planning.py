@@ -18,7 +18,7 @@ import torch
 
 from avn.agents import planner_agent
 from avn.agents.planner_agent import PlannerAgent
-from avn.agents.rollout import Labels, walk_room
+from avn.agents.rollout import Labels, rollout_scene
 from avn.apartments.local_patch import window_cells
 from avn.dataset.source_locations import relative_locations
 from avn.mapping.occupancy_mapper import OccupancyMapper
@@ -29,7 +29,7 @@ from avn.navigation.protocols import Protocol
 from avn.planning import shortest_path
 from avn.reporting.results import summarise
 
-VAR = Protocol("var", "box", False, "attempted", moves_factor=2.0)
+VAR = Protocol("var", "box", False, "moves", max_moves_ratio=2.0)
 FLAT = """
 aaaaaaaa#bbbbbbbb
 aaAa##aa#bbbb##bb
@@ -56,7 +56,7 @@ def senses(place: DrawnPlace) -> SceneObservations:
     generator = torch.Generator().manual_seed(0)
     sound = where + 0.7 * torch.randn(where.shape, generator=generator)
     windows = torch.from_numpy(window_cells(place.grid) >= 0).float()
-    return SceneObservations({"sound": sound[:, :, None, None]}, {"window": windows})
+    return SceneObservations({"source_estimate": sound[:, :, None, None]}, {"local_patch": windows})
 
 
 def peer_graph(cost: np.ndarray, walls: np.ndarray, turn: float) -> nx.DiGraph:
@@ -115,9 +115,9 @@ def main() -> None:
     observed = senses(place)
     episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
     agent, labels = PlannerAgent(OccupancyMapper(41)), Labels("ours_noexp", "resonance")
-    walk_room(agent, place, episodes, VAR, labels, observed)  # compiles
+    rollout_scene(agent, place, episodes, VAR, labels, observed)  # compiles
     planner_agent.first_actions = timed = Timed()
-    walk_room(agent, place, episodes, VAR, labels, observed)
+    rollout_scene(agent, place, episodes, VAR, labels, observed)
     planner_agent.first_actions = shortest_path.first_actions
     own = timed.plans / timed.seconds
     peer = timed.peer_plans / timed.peer_seconds
@@ -126,7 +126,7 @@ def main() -> None:
     print(f"ratio: {own / peer:.0f} times")
     agent = PlannerAgent(OccupancyMapper())
     start = time.perf_counter()
-    frame = walk_room(agent, place, episodes, VAR, labels, observed)
+    frame = rollout_scene(agent, place, episodes, VAR, labels, observed)
     summarise(frame)
     seconds = (time.perf_counter() - start) * 1500 / len(frame)
     print(f"1,500 episodes of ours_noexp with figures: {seconds:.1f} s, one thread")

@@ -24,20 +24,20 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from avn.apartments.local_patch import window_cells
 from avn.dataset.source_locations import relative_locations
+from avn.navigation.batched_episodes import BatchedEpisodes
 from avn.navigation.observations import SceneObservations
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
-from avn.navigation.starts import build_starts
-from avn.navigation.tables import Tables, build_tables
-from avn.navigation.world import World
-from avn.rl.a3c import Training
-from avn.rl.config import A3CConfig
+from avn.navigation.scene_batch import SceneBatch, build_scene_batch
+from avn.navigation.start_sampler import build_start_sampler
+from avn.rl.a3c import A3C
 from avn.rl.environment import WalkEnv
-from avn.rl.explorations import draw_walks
-from avn.rl.networks import ActorCritic, Shape
-from avn.rl.worker import Task
+from avn.rl.exploration_memory import draw_walks
+from avn.rl.networks import ActorCritic, NetworkSpec
+from avn.rl.training import Training
+from avn.rl.worker import TrainingSpec
 
-VAR = Protocol("var", "box", False, "attempted", moves_factor=2.0)
+VAR = Protocol("var", "box", False, "moves", max_moves_ratio=2.0)
 FLAT = """
 aaaaaaaa#bbbbbbbb
 aaAa##aa#bbbb##bb
@@ -55,22 +55,22 @@ cc##ccccC#ddddddd
 WIDTH, N, STEPS = 128, 64, 20
 RECIPE = {
     "entropy": 0.01,
-    "episodes": N,
-    "steps": STEPS,
+    "num_envs": N,
+    "rollout_length": STEPS,
     "lr": 7e-4,
     "eps": 1e-5,
     "schedule": "constant",
 }
 ROWS = {
-    "a3c_v": ("feature",),
-    "a3c_va": ("feature", "sound_feature"),
-    "a3c_va_mapper": ("feature", "sound_feature", "map"),
-    "a3c_va_m": ("feature", "sound_feature", "memory"),
-    "a3c_va_m_mapper": ("feature", "sound_feature", "map", "memory"),
+    "a3c_v": ("visual_embedding",),
+    "a3c_va": ("visual_embedding", "audio_embedding"),
+    "a3c_va_mapper": ("visual_embedding", "audio_embedding", "map"),
+    "a3c_va_m": ("visual_embedding", "audio_embedding", "memory"),
+    "a3c_va_m_mapper": ("visual_embedding", "audio_embedding", "map", "memory"),
 }
 
 
-def world_tables() -> tuple[list, Tables]:
+def world_tables() -> tuple[list, SceneBatch]:
     """Two copies of the flat, with random pictures and sound that tells where it comes from."""
     places = [draw("one", FLAT), draw("two", FLAT)]
     generator = torch.Generator().manual_seed(0)
@@ -83,36 +83,39 @@ def world_tables() -> tuple[list, Tables]:
         heard = clips + torch.randn(clips.shape, generator=generator)
         pictures = torch.randn(4 * len(lattice), 1280, generator=generator)
         windows = torch.from_numpy(window_cells(place.grid) >= 0).float()
-        visual = {"feature": torch.nn.functional.normalize(pictures), "window": windows}
-        observed.append(SceneObservations({"sound_feature": heard.half()}, visual))
-    return places, build_tables(places, VAR, observed)
+        visual = {
+            "visual_embedding": torch.nn.functional.normalize(pictures),
+            "local_patch": windows,
+        }
+        observed.append(SceneObservations({"audio_embedding": heard.half()}, visual))
+    return places, build_scene_batch(places, VAR, observed)
 
 
-def task_of(row: str, places: list, tables: Tables, **recipe) -> Task:
+def spec_of(row: str, places: list, tables: SceneBatch, **recipe) -> TrainingSpec:
     """What there is to learn in a row of the table."""
     names = ROWS[row]
     both = {**tables.visual, **tables.audio}
     features = {name: both[name].shape[-1] for name in names if name in both}
     memory, maps = 128 * ("memory" in names), "map" in names
-    shape = Shape(features, VAR.actions, WIDTH, memory, maps * (2 if memory else 1))
+    shape = NetworkSpec(features, VAR.actions, WIDTH, memory, maps * (2 if memory else 1))
     network = ActorCritic(shape)
     for name in features:
         network.standardise(name, both[name][::7])
     walks = draw_walks(places, tables, 32, 400, 0) if memory else None
-    given = A3CConfig(**(RECIPE | recipe))
-    return Task(tables, VAR, shape, given, dict(network.named_buffers()), walks=walks)
+    given = A3C(**(RECIPE | recipe))
+    return TrainingSpec(tables, VAR, shape, given, dict(network.named_buffers()), walks=walks)
 
 
 class Ours:
     """A training of ours: steps a second, and the return of its last rounds."""
 
-    def __init__(self, task: Task, steps: int) -> None:
-        torch.manual_seed(task.recipe.train_seed)
-        network = ActorCritic(task.shape)
-        network.load_state_dict(task.buffers, strict=False)
+    def __init__(self, spec: TrainingSpec, steps: int) -> None:
+        torch.manual_seed(spec.recipe.train_seed)
+        network = ActorCritic(spec.shape)
+        network.load_state_dict(spec.buffers, strict=False)
         with tempfile.TemporaryDirectory() as folder:
             measure = {"validation/spl": 0.0}
-            curve = Training(task, network, Path(folder), lambda _: measure, "b" * 64).run()
+            curve = Training(spec, network, Path(folder), lambda _: measure, "b" * 64).run()
         rounds = curve[1:]
         self.rate = float(np.mean([own["steps_per_second"] for own in rounds[-2:]]))
         self.earned = rounds[-1]["return"]
@@ -122,8 +125,10 @@ class Ours:
 class PeerEnv(VecEnv):
     """The same world for Stable-Baselines3: features gathered for all episodes at once."""
 
-    def __init__(self, tables: Tables, names: tuple[str, ...], seed: int, max_steps: int) -> None:
-        world = World(tables, build_starts(tables), N, VAR, max_steps, seed=seed)
+    def __init__(
+        self, tables: SceneBatch, names: tuple[str, ...], seed: int, max_steps: int
+    ) -> None:
+        world = BatchedEpisodes(tables, build_start_sampler(tables), N, VAR, max_steps, seed=seed)
         self.env = WalkEnv(world, names)
         boxes = {
             name: gymnasium.spaces.Box(*self.env.features.range(name), value.shape[1:])
@@ -133,7 +138,7 @@ class PeerEnv(VecEnv):
         super().__init__(N, space, gymnasium.spaces.Discrete(VAR.actions))
 
     def _seen(self) -> dict[str, np.ndarray]:
-        seen = self.env.look()
+        seen = self.env.observation()
         found = self.env.features(seen["state"], seen["clip"])
         return {name: value.float().numpy() for name, value in found.items()}
 
@@ -192,7 +197,7 @@ class Returns(BaseCallback):
         return float(np.mean([own for at, own in self.ended if at > end - last]))
 
 
-def peer(tables: Tables, row: str, steps: int, seed: int, threads: int) -> tuple[float, float]:
+def peer(tables: SceneBatch, row: str, steps: int, seed: int, threads: int) -> tuple[float, float]:
     """Steps a second and last return of Stable-Baselines3's A2C."""
     torch.set_num_threads(threads)
     env = PeerEnv(tables, ROWS[row], seed, 200)
@@ -219,15 +224,17 @@ def peer(tables: Tables, row: str, steps: int, seed: int, threads: int) -> tuple
     return watch.rate(), watch.earned(steps // 10)
 
 
-def environment(tables: Tables) -> None:
+def environment(tables: SceneBatch) -> None:
     """Steps a second of the environment alone, with features gathered."""
     for n in (64, 256, 1024):
-        env = WalkEnv(World(tables, build_starts(tables), n, VAR, 200), ROWS["a3c_va"])
+        env = WalkEnv(
+            BatchedEpisodes(tables, build_start_sampler(tables), n, VAR, 200), ROWS["a3c_va"]
+        )
         actions = torch.randint(4, (200, n))
         began = time.perf_counter()
         for own in actions:
             _, terminated, truncated = env.move(own)
-            seen = env.look()
+            seen = env.observation()
             env.features(seen["state"], seen["clip"])
             done = terminated | truncated
             if bool(done.any()):
@@ -243,12 +250,12 @@ def main() -> None:
     environment(tables)
     each = max(1, steps // 10)
     for row in ROWS:
-        task = task_of(row, places, tables, total=steps, validate_every=each)
-        print(f"{row}, two workers, N={N} each: {Ours(task, steps).rate:,.0f} steps/s")
+        spec = spec_of(row, places, tables, total_steps=steps, validate_every=each)
+        print(f"{row}, two workers, N={N} each: {Ours(spec, steps).rate:,.0f} steps/s")
     ours, peers = [], []
     for seed in range(3):
-        options = {"total": steps, "validate_every": each, "train_seed": seed}
-        ours.append(Ours(task_of("a3c_va", places, tables, **options), steps))
+        options = {"total_steps": steps, "validate_every": each, "train_seed": seed}
+        ours.append(Ours(spec_of("a3c_va", places, tables, **options), steps))
         peers += [(threads, *peer(tables, "a3c_va", steps, seed, threads)) for threads in (1, 2)]
     fastest = max(rate for _, rate, _ in peers)
     rate = max(own.rate for own in ours)

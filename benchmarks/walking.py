@@ -21,7 +21,7 @@ from torch import Tensor
 from avn.agents.greedy import Greedy
 from avn.agents.oracle import Oracle
 from avn.agents.random_walk import RandomWalk
-from avn.agents.rollout import Labels, walk, walk_room
+from avn.agents.rollout import Labels, rollout_scene, walk
 from avn.core.actions import BACKWARD, FORWARD, ROTATE_LEFT, ROTATE_RIGHT, transitions
 from avn.core.random import scramble
 from avn.navigation.distances import measure
@@ -33,7 +33,7 @@ from avn.navigation.simulator import Simulator
 from avn.reporting.results import summarise
 
 SOUNDS = ("ring", "alarm", "clock")
-VAR = Protocol("var", "box", False, "attempted", moves_factor=2.0)
+VAR = Protocol("var", "box", False, "moves", max_moves_ratio=2.0)
 TAKES = 4
 FLAT = """
 aaaaaaaa#bbbbbbbb
@@ -52,7 +52,7 @@ cc##ccccC#ddddddd
 
 
 @dataclass
-class Tables:
+class SceneBatch:
     """What the peer looks up, as lists."""
 
     table: list[list[int]]
@@ -65,9 +65,11 @@ class Tables:
 class PlainEpisode:
     """One episode under `var` in plain Python: the same rules and the same observations."""
 
-    def __init__(self, tables: Tables, start: int, source: int, sound: int, takes: list[int]):
+    def __init__(
+        self, tables: SceneBatch, start: int, source: int, sound: int, realisations: list[int]
+    ):
         self.tables, self.start, self.source, self.sound = tables, start, source, sound
-        self.takes = takes
+        self.realisations = realisations
         self.state, self.attempted, self.actions = start, 0, 0
         self.collided = self.success = self.done = False
         self.limit = 2 * tables.source_moves[source][start // 4]
@@ -91,7 +93,7 @@ class PlainEpisode:
         """What the agent perceives."""
         x, y = self.tables.lattice[self.state // 4]
         dx, dy = x - self.origin[0], y - self.origin[1]
-        take = self.takes[self.actions]
+        take = self.realisations[self.actions]
         return {
             "collided": self.collided,
             "odometry": (
@@ -99,7 +101,7 @@ class PlainEpisode:
                 dx * self.front[0] + dy * self.front[1],
                 (self.state - self.start) % 4,
             ),
-            "sound": self.tables.hearing[self.source][self.state][self.sound][take],
+            "source_estimate": self.tables.hearing[self.source][self.state][self.sound][take],
         }
 
 
@@ -111,7 +113,7 @@ class PlainGreedy:
 
     def act(self, observation: dict) -> int:
         """One action."""
-        right, front = observation["sound"]
+        right, front = observation["source_estimate"]
         if (front > 0 and front >= abs(right)) or self.turns >= self.patience:
             self.turns = 0
             return FORWARD
@@ -119,10 +121,12 @@ class PlainGreedy:
         return ROTATE_LEFT if right < 0 else ROTATE_RIGHT
 
 
-def plain_walk(tables: Tables, calls: list[tuple[int, int, int]], takes: list[list[int]]) -> list:
+def plain_walk(
+    tables: SceneBatch, calls: list[tuple[int, int, int]], realisations: list[list[int]]
+) -> list:
     """One episode after another."""
     ended = []
-    for call, own in zip(calls, takes, strict=True):
+    for call, own in zip(calls, realisations, strict=True):
         episode, agent = PlainEpisode(tables, *call, own), PlainGreedy()
         observation = episode.observe()
         while not episode.done:
@@ -134,14 +138,14 @@ def plain_walk(tables: Tables, calls: list[tuple[int, int, int]], takes: list[li
 def compare(place: DrawnPlace, episodes: Episodes) -> None:
     """Measure both on the same episodes, see that they agree, and print."""
     hearing = made_up_hearing(place)
-    simulator = Simulator(place, episodes, VAR, SceneObservations({"sound": hearing}))
+    simulator = Simulator(place, episodes, VAR, SceneObservations({"source_estimate": hearing}))
     walk(Greedy(), simulator)
     begin = time.perf_counter()
     walk(Greedy(), simulator)
     batched = time.perf_counter() - begin
 
     distances = measure(place, VAR)
-    tables = Tables(
+    tables = SceneBatch(
         transitions(place.grid.neighbours).tolist(),
         place.grid.lattice.tolist(),
         distances.goal.tolist(),
@@ -149,11 +153,11 @@ def compare(place: DrawnPlace, episodes: Episodes) -> None:
         hearing.tolist(),
     )
     steps = np.arange(VAR.max_actions + 1)
-    takes = (scramble(episodes.keys()[:, None], steps) % np.uint64(TAKES)).tolist()
+    realisations = (scramble(episodes.keys()[:, None], steps) % np.uint64(TAKES)).tolist()
     columns = (episodes.start.tolist(), episodes.source.tolist(), episodes.sound.tolist())
     calls = list(zip(*columns, strict=True))
     begin = time.perf_counter()
-    ended = plain_walk(tables, calls, takes)
+    ended = plain_walk(tables, calls, realisations)
     plain = time.perf_counter() - begin
     for name in ("state", "attempted", "actions", "success"):
         assert getattr(simulator, name).tolist() == [getattr(own, name) for own in ended], name
@@ -186,8 +190,13 @@ def rows(places: list[DrawnPlace]) -> None:
             hearing = made_up_hearing(place)
             labels = Labels(name, "resonance")
             frames.append(
-                walk_room(
-                    agent, place, episodes, VAR, labels, SceneObservations({"sound": hearing})
+                rollout_scene(
+                    agent,
+                    place,
+                    episodes,
+                    VAR,
+                    labels,
+                    SceneObservations({"source_estimate": hearing}),
                 )
             )
         frame = pd.concat(frames)

@@ -32,7 +32,9 @@ aaaaaaa#bbbbbbbb
 aaaaaaaabbbbbbbb
 aaaaaaa#bbbbbbbb
 """
-VAR = Protocol("var", "box", False, "attempted", moves_factor=2.0, starts=6, exploration=60)
+VAR = Protocol(
+    "var", "box", False, "moves", max_moves_ratio=2.0, num_starts=6, exploration_steps=60
+)
 TAKES = 3
 
 
@@ -49,10 +51,10 @@ def simulator(place: DrawnPlace, heard: Tensor | None = None) -> Simulator:
     sources = torch.from_numpy(np.asarray(place.sources)).long()
     where = relative_locations(lattice, sources)[:, :, None, None].expand(-1, -1, 1, TAKES, -1)
     visual = {
-        "window": torch.from_numpy(window_cells(place.grid) >= 0).float(),
-        "feature": torch.eye(4 * place.grid.cells),  # every state looks like itself alone
+        "local_patch": torch.from_numpy(window_cells(place.grid) >= 0).float(),
+        "visual_embedding": torch.eye(4 * place.grid.cells),  # every state looks like itself alone
     }
-    observed = SceneObservations({"sound": where if heard is None else heard}, visual)
+    observed = SceneObservations({"source_estimate": where if heard is None else heard}, visual)
     return Simulator(place, frozen_episodes(place, ["ring"], VAR, 0), VAR, observed)
 
 

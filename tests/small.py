@@ -1,10 +1,15 @@
 """Small worlds for tests: settings with which a command on the mini split takes seconds."""
 
+from copy import deepcopy
+from functools import lru_cache
+
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
+from omegaconf import OmegaConf
 
-from avn.config import schema
+from avn.config import registry
 from avn.config.folder import conf_folder
+from avn.config.spare import compose_fitting
 from avn.dataset.build import build_geometry
 from avn.dataset.scene import load_scene
 from avn.pipeline.export import settings_of
@@ -17,8 +22,8 @@ SMALL = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
-    "takes=2",
-    "protocol.starts=4",
+    "realisations=2",
+    "protocol.num_starts=4",
     "sound=[alarm,clock]",
     "renderer.camera.size=32",
     "renderer.samples=1",
@@ -30,31 +35,44 @@ SMALL = (
 # The occupancy network of a row that sees.
 EYES = (
     "occupancy_model.epochs=1",
-    "occupancy_model.looks=1",
+    "occupancy_model.appearances=1",
     "occupancy_model.times=1",
     "occupancy_model.validation_views=40",
 )
 # An actor-critic row that has learnt nothing.
 A3C = (
-    "protocol.exploration=30",
-    "a3c.workers=1",
-    "a3c.episodes=8",
-    "a3c.steps=5",
-    "a3c.total=400",
-    "a3c.validate_every=400",
-    "a3c.validation_starts=1",
-    "a3c.takes=1",
-    "a3c.walks=2",
-    "a3c.refresh=5",
+    "protocol.exploration_steps=30",
+    "algorithm.workers=1",
+    "algorithm.num_envs=8",
+    "algorithm.rollout_length=5",
+    "algorithm.total_steps=400",
+    "algorithm.validate_every=400",
+    "algorithm.validation_starts=1",
+    "algorithm.realisations=1",
+    "algorithm.exploration_walks=2",
+    "algorithm.memory_refresh_interval=5",
 )
 
 
-def composed(*overrides, command="eval"):
+def composed(*overrides, command="eval", compose=compose):
     """The config of a command."""
     GlobalHydra.instance().clear()
-    schema.register()
+    registry.register()
     with initialize_config_dir(str(conf_folder().resolve()), version_base="1.3"):
         return compose(command, overrides=[*overrides])
+
+
+@lru_cache
+def _option(group, option):
+    return composed(f"{group}={option}")[group]
+
+
+def option(group, name, **changes):
+    """The node of an option such as `sound_model=cnn5`, with changes such as `net__pool="max"`."""
+    found = deepcopy(_option(group, name))
+    for key, value in changes.items():
+        OmegaConf.update(found, key.replace("__", "."), value)
+    return found
 
 
 def fitting(chosen, *settings):
@@ -64,12 +82,13 @@ def fitting(chosen, *settings):
     begins with it.
     """
     chosen, *more = [chosen] if isinstance(chosen, str) else chosen
+    given = (chosen, *settings, *more)
     if chosen == "generate":
-        read = settings_of(composed(*settings, command="generate"))
+        read = settings_of(composed(*settings, command="generate", compose=compose_fitting))
     elif chosen.startswith("model="):
-        read = model_of(composed(chosen, *settings, *more, command="train")).read()
+        read = model_of(composed(*given, command="train", compose=compose_fitting)).read()
     else:
-        read = Evaluation(composed(chosen, *settings, *more)).read()
+        read = Evaluation(composed(*given, compose=compose_fitting)).read()
     keys = {leaf.rsplit(".", n)[0] for leaf in read for n in range(leaf.count(".") + 1)}
     return tuple(own for own in settings if own.split("=")[0] in keys)
 

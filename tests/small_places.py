@@ -29,7 +29,9 @@ def corridor() -> DrawnPlace:
 @pytest.fixture
 def protocols() -> dict[str, Protocol]:
     return {
-        "var": Protocol("var", "box", False, "attempted", moves_factor=2.0, exploration=0),
-        "var_stop": Protocol("var_stop", "box", True, "attempted", moves_factor=2.0, exploration=0),
-        "stop": Protocol("stop", "radius", True, "walked", exploration=0),
+        "var": Protocol("var", "box", False, "moves", max_moves_ratio=2.0, exploration_steps=0),
+        "var_stop": Protocol(
+            "var_stop", "box", True, "moves", max_moves_ratio=2.0, exploration_steps=0
+        ),
+        "stop": Protocol("stop", "radius", True, "metres", exploration_steps=0),
     }

@@ -19,7 +19,7 @@ SMALL = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
-    "takes=1",
+    "realisations=1",
     "renderer.camera.size=32",
     "renderer.samples=1",
     "renderer.light.gather_rays=4",
@@ -47,7 +47,7 @@ def test_greedy_walks_on_sound_that_was_made_on_the_way(command, outputs):
     episodes = pd.read_csv(folder / "episodes.csv")
     results = pd.read_csv(folder / "results.csv")
     assert len(episodes) == 2 * 20
-    assert results["room"].tolist()[-1] == "average"
+    assert results["scene"].tolist()[-1] == "average"
     assert results["sr"].iloc[-1] == pytest.approx(episodes["success"].mean())
     assert results["spl"].iloc[-1] == pytest.approx(episodes["spl"].mean())
     assert list(folder.glob("events.out.tfevents.*"))
@@ -78,8 +78,8 @@ def test_a_sweep_ends_with_mean_and_spread_and_takes_overrides_on_both_sides_of_
         for file in sorted(outputs.glob("eval/random_walk/alarm/seed*/results.csv"))
     ]
     assert len(seeds) == 3
-    rates = [table.loc[table["room"] == "average", "sr"].item() for table in seeds]
-    row = summary[summary["room"] == "average"]
+    rates = [table.loc[table["scene"] == "average", "sr"].item() for table in seeds]
+    row = summary[summary["scene"] == "average"]
     assert row["sr"].item() == pytest.approx(np.mean(rates))
     assert row["sr_std"].item() == pytest.approx(np.std(rates, ddof=1))
 
@@ -91,11 +91,11 @@ def test_a_failing_job_is_named_and_the_others_run(command, outputs):
         "split=mini",
         f"outputs={outputs}",
         "-m",
-        "protocol.starts=20,100000",
+        "protocol.num_starts=20,100000",
         "seed=0",
     )
     assert code == 2
-    assert any("failed: " in line and "protocol.starts=100000" in line for line in err)
+    assert any("failed: " in line and "protocol.num_starts=100000" in line for line in err)
     assert "1 of 2 jobs failed" in err[-1]
     assert any("1 seeds: SR" in line for line in out)
 
@@ -123,7 +123,7 @@ def test_a_sweep_keeps_unlike_runs_apart(command, outputs):
         "split=mini",
         f"outputs={outputs}",
         "sound=alarm",
-        "protocol.starts=5,10",
+        "protocol.num_starts=5,10",
         "seed=0,1",
         "-m",
     )
@@ -224,7 +224,7 @@ def test_reproduce_runs_the_rows_that_are_named(command, outputs):
     assert code == 0, err
     results = pd.read_csv(Path(out[-1]) / "results.csv")
     assert set(results["agent"]) == {"random_walk", "oracle"}
-    best = results[(results["agent"] == "oracle") & (results["room"] == "average")]
+    best = results[(results["agent"] == "oracle") & (results["scene"] == "average")]
     assert best["sr"].to_numpy() == pytest.approx(1)
     assert best["spl"].to_numpy() == pytest.approx(1)
     files = {path.name for path in Path(out[-1]).iterdir()}
@@ -257,7 +257,7 @@ def test_sounds_may_be_a_list_with_paths(command, outputs, tmp_path):
 
 
 def test_a_refused_run_leaves_nothing_behind(command, tmp_path):
-    for mistake in ("agent.name=../../esc", "seed=-1", "takes=0", "sound=nosuch.wav"):
+    for mistake in ("agent.name=../../esc", "seed=-1", "realisations=0", "sound=nosuch.wav"):
         code, _, err = run_greedy(command, tmp_path / "o", mistake)
         assert code == 2, err
         assert len(err) == 1

@@ -13,8 +13,8 @@ FAST = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
-    "takes=1",
-    "protocol.starts=4",
+    "realisations=1",
+    "protocol.num_starts=4",
 )
 SMALL = ("split=mini", *FAST)
 
@@ -74,9 +74,9 @@ def test_an_apartment_of_ones_own_is_walked(command, outputs, tmp_path, monkeypa
     options = (
         "split.folder=my_apartments",
         "split.name=mine",
-        "protocol.starts=4",
+        "protocol.num_starts=4",
         f"outputs={outputs}",
     )
     code, out, err = command("eval", "agent=random_walk", *options)
     assert code == 0, err
-    assert set(pd.read_csv(Path(out[-1]) / "episodes.csv")["room"]) == {"home"}
+    assert set(pd.read_csv(Path(out[-1]) / "episodes.csv")["scene"]) == {"home"}

@@ -1,5 +1,6 @@
 """Parts from outside the package: one importable file and one config file each, nothing else."""
 
+import json
 from pathlib import Path
 
 import pandas as pd
@@ -27,6 +28,8 @@ from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.modules.occupancy_cnn import OccupancyCnn
 from avn.modules.sound_cnn import SoundCnn
 from avn.navigation.protocols import Protocol
+from avn.rl.algorithm import Algorithm
+from avn.rl.rollouts import advantages_and_targets, trunk_outputs
 from avn.views.renderer import Renderer, RendererConfig
 
 
@@ -66,8 +69,8 @@ class ForgetfulMapper(OccupancyMapper):
 class LazyPlanner(PlannerAgent):
     """Does nothing but turn for the first steps."""
 
-    def __init__(self, mapper, rest: int = 3, detour: float = 2.0, truth=(), stop_at: float = 0.5):
-        super().__init__(mapper, detour=detour, truth=truth, stop_at=stop_at)
+    def __init__(self, mapper, rest: int = 3, **settings):
+        super().__init__(mapper, **settings)
         self.resting = rest
 
     def reset(self, n, generator, protocol):
@@ -129,6 +132,25 @@ class Stripes(Renderer):
         return rgb, np.ones((len(headings), size, size), np.float16)
 
 
+@dataclasses.dataclass
+class Reinforce(Algorithm):
+    """Policy gradient of the return (Williams, Machine Learning 8, 1992), less a constant."""
+
+    constant: float = 0.0
+
+    def build_loss(self, network, features):
+        def loss(batch):
+            joint = trunk_outputs(network, features, batch)
+            value = torch.zeros_like(joint[..., :1])
+            _, returns = advantages_and_targets(network, features, batch, value, self.gamma, 1.0)
+            log_p = network.actor(joint).log_softmax(-1)
+            chosen = log_p.gather(-1, batch["action"][..., None])
+            earned = returns.detach()
+            return -(chosen * (earned - self.constant)).mean(), {"return": float(earned.mean())}
+
+        return loss
+
+
 class Clipping(Microphone):
     """Cannot record more than so much."""
 
@@ -149,10 +171,11 @@ OPTIONS = {
         "_target_": "own_parts.NearProtocol",
         "name": "near",
         "goal": "box",
-        "says_stop": False,
-        "path": "attempted",
+        "requires_stop": False,
+        "path_length": "moves",
     },
     "renderer/stripes": {"_target_": "own_parts.Stripes", "name": "stripes"},
+    "algorithm/reinforce": {"_target_": "own_parts.Reinforce", "lr": 0.001},
     "microphone/clipping": {"_target_": "own_parts.Clipping"},
 }
 
@@ -218,7 +241,7 @@ def test_a_mapper(run):
 
 def test_a_planner(run):
     found = episodes(run("eval", "agent=ours_noexp", "planner=lazy", "planner.rest=6"))
-    assert (found["actions"] - found["path"] >= 6).all()
+    assert (found["actions"] - found["path_length"] >= 6).all()
 
 
 def test_an_agent_with_settings(run):
@@ -228,6 +251,16 @@ def test_an_agent_with_settings(run):
         for more in ("baseline.side=1", "baseline.clockwise=false")
     )
     assert not one["end_cell"].equals(other["end_cell"])
+
+
+def test_an_algorithm(run):
+    folder = run("train", "model=a3c_va", "algorithm=reinforce", "algorithm.constant=0.5")
+    curve = json.loads((folder / "curve.json").read_text())
+    assert curve[-1]["steps"] == 400
+    assert "return" in curve[-1]
+    assert "entropy" not in curve[-1]  # of A3C alone
+    walked = episodes(run("eval", "agent=a3c_va", "algorithm=reinforce"))
+    assert (walked["actions"] > 0).all()
 
 
 def test_a_protocol(run):
@@ -250,7 +283,7 @@ def test_a_condition_of_the_microphone(run):
     clean = run("eval", "agent=greedy")
     clipped = run("eval", "agent=greedy", "microphone=clipping", "microphone.limit=0.02")
     assert Evaluation(read_config(clipped)).folder == clipped
-    heard = [(folder / "hearing.csv").read_text() for folder in (clean, clipped)]
+    heard = [(folder / "source_estimates.csv").read_text() for folder in (clean, clipped)]
     assert heard[0] != heard[1]
 
 

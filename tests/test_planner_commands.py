@@ -9,9 +9,9 @@ from small import EYES, SMALL, fitting
 
 # One take of each clip of one sound.
 WORLD = (
-    *(own for own in SMALL if not own.startswith(("sound=", "takes="))),
+    *(own for own in SMALL if not own.startswith(("sound=", "realisations="))),
     "stop_model.epochs=1",
-    "takes=1",
+    "realisations=1",
     "sound=alarm",
 )
 
@@ -54,45 +54,47 @@ def test_it_explores_and_finds_itself(command, outputs, localisation, exploratio
     code, out, err = ours(command, outputs, "agent=ours_exp", *options)
     assert code == 0, err
     assert len(records(out)) == 2 * 4
-    places = pd.read_csv(Path(out[-1]) / "places.csv").groupby("cells")["error_m"].mean()
+    places = pd.read_csv(Path(out[-1]) / "localisation.csv").groupby("cells")["error_m"].mean()
     assert places["walked"] < places["other"]
     assert any("where views are recognised" in line for line in out)
 
 
 def test_what_its_networks_tell_it_is_judged_beside_its_records(command, outputs):
     _, out, _ = ours(command, outputs, "agent=ours_noexp")
-    seen = pd.read_csv(Path(out[-1]) / "windows.csv")
-    room = seen[seen["cells"] == "visible"].set_index(["room", "by"])["auc"]
+    seen = pd.read_csv(Path(out[-1]) / "local_patches.csv")
+    room = seen[seen["cells"] == "visible"].set_index(["scene", "by"])["auc"]
     assert room["all", "network"] > 0.5
     assert room["room_1", "prior"] == pytest.approx(room["all", "prior"])  # the only room
-    heard = pd.read_csv(Path(out[-1]) / "hearing.csv")
+    heard = pd.read_csv(Path(out[-1]) / "source_estimates.csv")
     assert set(heard["acoustics"]) == {"resonance"}
-    assert not (Path(out[-1]) / "places.csv").exists()
+    assert not (Path(out[-1]) / "localisation.csv").exists()
     assert any("which cells look free" in line for line in out)
 
 
 def test_the_truth_in_place_of_a_part_makes_a_bound_of_it(command, outputs):
-    refused, _, err = ours(command, outputs, "agent=ours_noexp", "agent.truth=[location,window]")
+    refused, _, err = ours(
+        command, outputs, "agent=ours_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"
+    )
     assert refused == 2
     assert "agent.privileged: False, but 'PlannerAgent' is shown the truth" in err[-1]
     code, out, err = ours(
         command,
         outputs,
         "agent=ours_noexp",
-        "agent.truth=[location,window]",
+        "agent.oracle_inputs=[source_estimate,local_patch]",
         "agent.privileged=true",
     )
     assert code == 0, err
     episodes = records(out)
-    assert set(episodes["agent"]) == {"ours_noexp-true-location-true-window"}
+    assert set(episodes["agent"]) == {"ours_noexp-true-source_estimate-true-local_patch"}
     assert episodes["success"].mean() > 0.8
     # what was given is no network's, so that there is nothing to judge
     assert not list(Path(out[-1]).glob("[hw]*.csv"))
 
 
 def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
-    _, out, _ = ours(command, outputs, "agent=ours_noexp", "part=validation")
-    assert set(records(out)["room"]) == {"val_1"}
+    _, out, _ = ours(command, outputs, "agent=ours_noexp", "subset=validation")
+    assert set(records(out)["scene"]) == {"val_1"}
 
 
 @pytest.mark.parametrize(
@@ -100,14 +102,20 @@ def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
     [
         (("agent=ours_noexp", "mapper=none"), "mapper: 'none' remembers nothing to plan on"),
         (("agent=ours_noexp", "look=twice"), "look: 'twice' is none of once, around"),
-        (("agent=ours_noexp", "part=all"), "part: 'all' is none of train, validation, test"),
+        (("agent=ours_noexp", "subset=all"), "subset: 'all' is none of train, validation, test"),
         (("agent=ours_noexp", "baseline=greedy"), "cannot both act"),
-        (("agent=greedy", "agent.truth=[map]"), "agent.truth: only agents that plan"),
+        (
+            ("agent=greedy", "agent.oracle_inputs=[map]"),
+            "agent.oracle_inputs: only agents that plan",
+        ),
         (("agent=ours_exp", "localisation=gps"), "localisation: 'gps' is none of retrieval"),
         (("agent=ours_exp", "episodes=exhaustive"), "have no exploration walk"),
         (("agent=ours_exp", "exploration=some"), "exploration: 'some' is none of shared, own"),
-        (("agent=ours_exp", "mapper.windows=true"), "needs the observation 'window'"),
-        (("agent=ours_noexp", "planner.source=last"), "planner.source: 'last' is none of newest"),
+        (("agent=ours_exp", "mapper.local_patches=true"), "needs the observation 'local_patch'"),
+        (
+            ("agent=ours_noexp", "planner.source_filter=last"),
+            "planner.source_filter: 'last' is none of latest",
+        ),
     ],
 )
 def test_a_mistake_is_one_line(command, outputs, options, said):

@@ -68,7 +68,7 @@ def test_figures_are_those_of_the_run_with_intervals_and_the_papers(
     browser, page, command, outputs
 ):
     run = made(command, outputs, "greedy")
-    table = pd.read_csv(run / "results.csv").query("sound == 'alarm' and room == 'room_1'")
+    table = pd.read_csv(run / "results.csv").query("sound == 'alarm' and scene == 'room_1'")
     row = (100 * table[["sr", "spl", "sr_low", "sr_high"]]).iloc[0]
     with opened(browser, page) as shown:
         cell = shown.locator("td.cell[data-run='2'][data-sound=alarm][data-room=room_1]")
@@ -144,7 +144,7 @@ def test_what_comes_from_names_is_shown_and_never_run(browser, tmp_path):
     )
     row = {"agent": evil, "protocol": evil, "acoustics": evil, "look": evil, "sound": evil}
     row |= {
-        "room": evil,
+        "scene": evil,
         "seed": 0,
         "episode": 0,
         "source": 0,

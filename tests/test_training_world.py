@@ -52,5 +52,5 @@ def test_another_test_world_trains_nothing(command, outputs, settings, tmp_path)
     assert len({first, louder, hidden, unheard, home}) == 5
     assert "home" in (home / "results.csv").read_text()
     assert "diffraction" in (hidden / "results.csv").read_text()
-    heard = [(folder / "hearing.csv").read_text() for folder in (first, louder, hidden)]
+    heard = [(folder / "source_estimates.csv").read_text() for folder in (first, louder, hidden)]
     assert len(set(heard)) == 3  # what is heard is another thing in each of them

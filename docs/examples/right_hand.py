@@ -9,10 +9,10 @@ from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT
 
 
 class RightHand(Agent):
-    needs = ("sound",)
+    needs = ("source_estimate",)
 
     def act(self, observation: TensorDict) -> Tensor:
-        right, front = observation["sound"].unbind(dim=-1)
+        right, front = observation["source_estimate"].unbind(dim=-1)
         turn = torch.where(right < 0, ROTATE_LEFT, ROTATE_RIGHT)
         actions = torch.where((front > 0) & (front >= right.abs()), FORWARD, turn)
         return torch.where(observation["collided"], ROTATE_RIGHT, actions)

@@ -9,7 +9,7 @@ from omegaconf import DictConfig
 
 from avn.config.cli import command
 from avn.config.unread import refuse_unread
-from avn.core.progress import tell
+from avn.core.progress import log
 from avn.pipeline import films
 from avn.pipeline.run import Evaluation, show_run
 from avn.pipeline.stage import build
@@ -22,11 +22,11 @@ def main(cfg: DictConfig) -> Path:
     run = Evaluation(cfg)
     run.check()
     refuse_unread("eval", cfg, run.read() | films.read(cfg))
-    build(run, asked=True)
+    build(run, explicit=True)
     folder = run.folder
     show_run(cfg, folder)
     films.make_films(cfg, folder)
-    tell(str(folder))
+    log(str(folder))
     return folder
 
 

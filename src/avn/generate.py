@@ -9,7 +9,7 @@ from omegaconf import DictConfig
 
 from avn.config.cli import command
 from avn.config.unread import refuse_unread
-from avn.core.progress import tell
+from avn.core.progress import log
 from avn.pipeline.export import generate, settings_of
 
 
@@ -18,7 +18,7 @@ def main(cfg: DictConfig) -> Path:
     """Make all scenes of the split and export what is asked for."""
     refuse_unread("generate", cfg, settings_of(cfg))
     folder = generate(cfg)
-    tell(str(folder))
+    log(str(folder))
     return folder
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from avn.config.cli import plainly
 from avn.config.saved import read_config
-from avn.core.progress import tell
+from avn.core.progress import log
 from avn.pipeline import replay
 from avn.pipeline.report_page import write_page
 
@@ -48,7 +48,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _report(options: argparse.Namespace) -> None:
     runs = [replay.open_run(folder, read_config(folder)) for folder in options.runs]
-    tell(str(write_page(runs, options.episodes, options.show, options.paths, options.output)))
+    log(str(write_page(runs, options.episodes, options.show, options.paths, options.output)))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from omegaconf import DictConfig
 from avn.config.cli import command
 from avn.config.rows import compose_row
 from avn.config.unread import refuse_unread
-from avn.core.progress import tell
+from avn.core.progress import log
 from avn.pipeline.reproduction import reproduce, settings_of
 
 
@@ -20,7 +20,7 @@ def main(cfg: DictConfig) -> Path:
     rows = [compose_row(cfg, row) for row in dict.fromkeys(cfg.rows)]
     refuse_unread("reproduce", cfg, settings_of(rows))
     folder = reproduce(cfg, rows)
-    tell(str(folder))
+    log(str(folder))
     return folder
 
 

@@ -9,7 +9,7 @@ from omegaconf import DictConfig
 
 from avn.config.cli import command
 from avn.config.unread import refuse_unread
-from avn.core.progress import tell
+from avn.core.progress import log
 from avn.pipeline.models import model_of, train_model
 
 
@@ -20,8 +20,8 @@ def main(cfg: DictConfig) -> Path:
     refuse_unread("train", cfg, {*model.read(), "model.name"})
     figures = train_model(model)
     for name, value in figures.items():
-        tell(f"{name}: {value:.3g}")
-    tell(str(model.folder))
+        log(f"{name}: {value:.3g}")
+    log(str(model.folder))
     return model.folder
 
 

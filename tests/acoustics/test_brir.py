@@ -14,7 +14,7 @@ from avn.acoustics.brir import (
     combine,
     cut_off_energy,
     head_filters,
-    render_first_arrivals,
+    render_direct_paths,
     render_source,
 )
 from avn.acoustics.materials import BANDS, SPEED_OF_SOUND
@@ -26,7 +26,7 @@ from avn.apartments.walls import walls
 from avn.core.errors import UserError
 
 CONFIG = AcousticsConfig(seconds=0.3, rays=2000)
-DIFFRACTION = dataclasses.replace(CONFIG, name="diffraction", first_arrival="round_corners")
+DIFFRACTION = dataclasses.replace(CONFIG, name="diffraction", direct_path="diffraction")
 ROOM = (5.0, 4.0, 2.6)
 SOURCE = np.array([1.0, 1.0, 1.0])
 
@@ -73,9 +73,9 @@ def test_turning_the_agent_is_turning_the_world_for_the_first_arrival(
 ) -> None:
     blocks = walls(two_rooms())
     ears = np.array([[2.0, 3.0, 1.5], [4.5, 3.0, 1.5], [5.5, 0.5, 1.5]])
-    first = render_first_arrivals(blocks, SOURCE, ears, config)
+    first = render_direct_paths(blocks, SOURCE, ears, config)
     x0, y0, x1, y1 = blocks.T
-    other = render_first_arrivals(
+    other = render_direct_paths(
         np.column_stack([y0, -x1, y1, -x0]), turned_points(SOURCE), turned_points(ears), config
     )
     # Who faced north and is turned with the world faces east.
@@ -117,7 +117,7 @@ def test_a_reflection_sounds_like_a_first_arrival_from_there() -> None:
     """Both ways of rendering agree in level, time and the ears' responses."""
     source = np.array([20.0, 5.0, 4.0])
     ear = np.array([[0.0, 0.0, 1.5]])
-    first = render_first_arrivals(np.zeros((0, 4)), source, ear, CONFIG)
+    first = render_direct_paths(np.zeros((0, 4)), source, ear, CONFIG)
     way = float(np.linalg.norm(source - ear[0]))
     event = one_event([1 / (4 * np.pi * way**2)] * 6, list((source - ear[0]) / way), metres=way)
     samples, scale = binaural_responses(event, Binaural.prepare(head_filters(16000), 4800), 16000)
@@ -172,7 +172,7 @@ def test_direct_to_reverberant_ratio_falls_with_distance() -> None:
     ears = np.array([[1.0 + d, 1.0 + d / 2, 1.5] for d in (0.5, 1.2, 2.2, 3.5)])
     surfaces = shoebox(ROOM, "plaster")
     tail = render_source(surfaces, SOURCE, ears, CONFIG)
-    first = render_first_arrivals(np.zeros((0, 4)), SOURCE, ears, CONFIG)
+    first = render_direct_paths(np.zeros((0, 4)), SOURCE, ears, CONFIG)
     reverberant = ((tail.samples * tail.scale[:, None, None, None]) ** 2).sum(axis=(1, 2, 3))
     direct = ((first.samples * first.scale[:, None, None, None]) ** 2).sum(axis=(1, 2, 3))
     assert (np.diff(decibel(direct / reverberant)) < -2).all()
@@ -223,7 +223,7 @@ def test_what_is_cut_off_is_measured() -> None:
 def test_combining_adds_the_first_arrival_at_its_onset() -> None:
     ears = np.array([[3.0, 2.0, 1.5]])
     tail = render_source(shoebox(ROOM, "plaster"), SOURCE, ears, CONFIG)
-    first = render_first_arrivals(np.zeros((0, 4)), SOURCE, ears, CONFIG)
+    first = render_direct_paths(np.zeros((0, 4)), SOURCE, ears, CONFIG)
     added = combine(tail, first) - tail.samples * tail.scale[0]
     onset, taps = int(first.onset[0]), first.samples.shape[-1]
     assert onset == round(np.linalg.norm(ears[0] - SOURCE) / SPEED_OF_SOUND * 16000)
@@ -237,7 +237,7 @@ def test_first_arrivals_of_a_regime_have_one_length() -> None:
     """So that those of several sources can be stacked, behind walls or not."""
     ears = np.array([[2.0, 2.0, 1.5]])
     lengths = {
-        render_first_arrivals(blocks, SOURCE, ears, DIFFRACTION).samples.shape
+        render_direct_paths(blocks, SOURCE, ears, DIFFRACTION).samples.shape
         for blocks in (np.zeros((0, 4)), walls(two_rooms()))
     }
     assert len(lengths) == 1
@@ -256,7 +256,7 @@ def test_int16_keeps_nine_tenths_of_a_promille_and_silence() -> None:
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("rays", 0), ("seconds", -1.0), ("first_arrival", "teleport"), ("receiver_radius", 0.0)],
+    [("rays", 0), ("seconds", -1.0), ("direct_path", "teleport"), ("receiver_radius", 0.0)],
 )
 def test_a_value_out_of_range_is_named(key: str, value: object) -> None:
     with pytest.raises(UserError, match=rf"^acoustics\.{key}: .*{value}.*use"):

@@ -15,11 +15,11 @@ from avn.acoustics.clips import (
     export_wav,
 )
 from avn.acoustics.dry_sounds import BUILTIN, load_sounds
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 
-QUIET = MicrophoneConfig(noise_rms=0.0)
+QUIET = Microphone(noise_rms=0.0)
 
 
 @pytest.fixture(autouse=True)
@@ -58,8 +58,8 @@ def many(
     """Clips of ``count`` takes through one BRIR (a unit impulse unless told)."""
     zeros = torch.zeros(count, dtype=torch.int64)
     spectra = brir_spectra(delays([0]) if brir is None else brir)
-    takes = torch.arange(count)
-    return renderer.render(spectra, ClipId(zeros, zeros, zeros + sound, takes), index=zeros)
+    realisations = torch.arange(count)
+    return renderer.render(spectra, ClipId(zeros, zeros, zeros + sound, realisations), index=zeros)
 
 
 @pytest.mark.parametrize("frequency", [440.0, 440.37])
@@ -122,7 +122,7 @@ def test_convolution_is_circular_and_longer_responses_fold() -> None:
 
 def test_the_noise_floor_has_its_level_and_differs_between_ears_and_takes() -> None:
     sounds = DrySounds({"tone": looped_tone(440.0, CLIP_SAMPLES)})
-    renderer = ClipRenderer(sounds, MicrophoneConfig(noise_rms=0.02), 0, "eval")
+    renderer = ClipRenderer(sounds, Microphone(noise_rms=0.02), 0, "eval")
     noise = many(renderer, 30, brir=torch.zeros(1, 2, 100)).flatten(0, 1)
     assert noise.square().mean().sqrt() == pytest.approx(0.02, rel=0.01)
     correlation = torch.corrcoef(noise) - torch.eye(len(noise))
@@ -131,7 +131,7 @@ def test_the_noise_floor_has_its_level_and_differs_between_ears_and_takes() -> N
 
 def test_gain_scales_the_sound_and_leaves_the_noise(bank: DrySounds) -> None:
     plain, loud, twice = (
-        same(ClipRenderer(bank, MicrophoneConfig(noise, gain), 0, "eval"), delays([5]))
+        same(ClipRenderer(bank, Microphone(noise, gain), 0, "eval"), delays([5]))
         for noise, gain in ((0.0, 1.0), (0.005, 1.0), (0.005, 2.0))
     )
     torch.testing.assert_close(twice - loud, plain, atol=1e-5, rtol=1e-4)
@@ -139,15 +139,15 @@ def test_gain_scales_the_sound_and_leaves_the_noise(bank: DrySounds) -> None:
 
 def test_signal_to_noise_at_one_metre_is_between_30_and_40_db() -> None:
     direct = 1 / np.sqrt(4 * np.pi)
-    assert 30 < 20 * np.log10(direct / MicrophoneConfig().noise_rms) < 40
+    assert 30 < 20 * np.log10(direct / Microphone().noise_rms) < 40
 
 
 def test_clips_are_the_same_bytes_again_and_in_any_batch(bank: DrySounds) -> None:
     keys = ClipId(*map(torch.tensor, ([0, 1, 2], [5, 5, 6], [0, 1, 2], [0, 3, 1])))
     brirs = torch.randn(3, 2, 800, generator=torch.Generator().manual_seed(0))
-    renderer = ClipRenderer(bank, MicrophoneConfig(), 4, "train")
+    renderer = ClipRenderer(bank, Microphone(), 4, "train")
     clips = renderer.render(brir_spectra(brirs), keys)
-    again = ClipRenderer(bank, MicrophoneConfig(), 4, "train").render(brir_spectra(brirs), keys)
+    again = ClipRenderer(bank, Microphone(), 4, "train").render(brir_spectra(brirs), keys)
     assert torch.equal(clips, again)
     for row in range(3):
         alone = renderer.render(brir_spectra(brirs[[row]]), ClipId(*(key[[row]] for key in keys)))
@@ -172,24 +172,22 @@ def test_each_word_of_the_key_changes_the_clip(bank: DrySounds, changed: str) ->
 def test_a_sound_is_drawn_alike_whichever_sounds_are_beside_it(bank: DrySounds) -> None:
     alone = DrySounds(load_sounds({"clock": "clock"}))
     brir = delays([0])
-    ours = same(ClipRenderer(alone, MicrophoneConfig(), 0, "eval"), brir, sound=0)
-    theirs = same(ClipRenderer(bank, MicrophoneConfig(), 0, "eval"), brir, sound=2)
+    ours = same(ClipRenderer(alone, Microphone(), 0, "eval"), brir, sound=0)
+    theirs = same(ClipRenderer(bank, Microphone(), 0, "eval"), brir, sound=2)
     torch.testing.assert_close(ours, theirs)
 
 
 @pytest.mark.parametrize(
-    ("config", "key"),
+    ("settings", "key"),
     [
-        (MicrophoneConfig(noise_rms=-1.0), "microphone.noise_rms"),
-        (MicrophoneConfig(noise_rms=float("nan")), "microphone.noise_rms"),
-        (MicrophoneConfig(gain=0.0), "microphone.gain"),
+        ({"noise_rms": -1.0}, "microphone.noise_rms"),
+        ({"noise_rms": float("nan")}, "microphone.noise_rms"),
+        ({"gain": 0.0}, "microphone.gain"),
     ],
 )
-def test_a_microphone_that_makes_no_sense(
-    bank: DrySounds, config: MicrophoneConfig, key: str
-) -> None:
+def test_a_microphone_that_makes_no_sense(settings: dict[str, float], key: str) -> None:
     with pytest.raises(UserError, match=key):
-        ClipRenderer(bank, config, 0, "eval")
+        Microphone(**settings)
 
 
 def test_export_writes_a_whole_file_of_two_channels(tmp_path: Path, bank: DrySounds) -> None:

@@ -177,7 +177,7 @@ def test_damaged_files_are_read_or_refused_but_never_crash(
         except UserError as error:
             refusals.append(str(error))
     assert len(refusals) > 5
-    assert not any("\n" in refusal for refusal in refusals)
+    assert not any("\n" in missing_error for missing_error in refusals)
     assert "Traceback" not in capfd.readouterr().err
 
 

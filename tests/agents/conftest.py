@@ -35,7 +35,7 @@ def hall() -> DrawnPlace:
 @pytest.fixture(params=["var", "var_stop", "stop"])
 def protocol(request: pytest.FixtureRequest) -> Protocol:
     return {
-        "var": Protocol("var", "box", False, "attempted", moves_factor=2.0),
-        "var_stop": Protocol("var_stop", "box", True, "attempted", moves_factor=2.0),
-        "stop": Protocol("stop", "radius", True, "walked"),
+        "var": Protocol("var", "box", False, "moves", max_moves_ratio=2.0),
+        "var_stop": Protocol("var_stop", "box", True, "moves", max_moves_ratio=2.0),
+        "stop": Protocol("stop", "radius", True, "metres"),
     }[request.param]

@@ -5,14 +5,14 @@ import pytest
 import torch
 
 from avn.agents.actor_critic import ActorCriticAgent
-from avn.agents.rollout import Labels, walk, walk_room
+from avn.agents.rollout import Labels, rollout_scene, walk
 from avn.core.errors import UserError
 from avn.navigation.episodes import frozen_episodes
 from avn.navigation.observations import SceneObservations
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
-from avn.rl.networks import ActorCritic, Shape
+from avn.rl.networks import ActorCritic, NetworkSpec
 
 FLAT = """
 aaaaaaaaaa
@@ -21,13 +21,15 @@ aaaaaaaaaa
 aaa.bbbbbb
 Aaa.bbbBbb
 """
-RULES = Protocol("var", "box", False, "attempted", moves_factor=2.0, starts=6, exploration=30)
+RULES = Protocol(
+    "var", "box", False, "moves", max_moves_ratio=2.0, num_starts=6, exploration_steps=30
+)
 
 
 def make_agent(memory=0, maps=False, hears=True, **options) -> ActorCriticAgent:
-    features = {"feature": 8} | ({"sound_feature": 6} if hears else {})
+    features = {"visual_embedding": 8} | ({"audio_embedding": 6} if hears else {})
     torch.manual_seed(0)
-    shape = Shape(features, 4, 16, memory, maps * (2 if memory else 1), map_width=11)
+    shape = NetworkSpec(features, 4, 16, memory, maps * (2 if memory else 1), map_width=11)
     network = ActorCritic(shape)
     with torch.no_grad():
         network.actor.weight.mul_(300)  # far from uniform, so that what it sees counts
@@ -41,13 +43,15 @@ def senses(place):
     feature = torch.nn.functional.normalize(torch.randn(states, 8, generator=generator), dim=1)
     window = torch.rand(states, 5, 5, generator=generator)
     heard = torch.randn(sources, states, 2, 3, 6, generator=generator)
-    return SceneObservations({"sound_feature": heard}, {"feature": feature, "window": window})
+    return SceneObservations(
+        {"audio_embedding": heard}, {"visual_embedding": feature, "local_patch": window}
+    )
 
 
 def records(agent, sounds=("one", "two"), rows=None):
     place = draw("flat", FLAT)
     episodes = frozen_episodes(place, sounds, RULES, seed=0)
-    return walk_room(agent, place, episodes, RULES, Labels("a3c", "resonance"), senses(place))
+    return rollout_scene(agent, place, episodes, RULES, Labels("a3c", "resonance"), senses(place))
 
 
 @pytest.mark.parametrize("memory", [0, 5])
@@ -69,8 +73,12 @@ def test_the_same_seed_walks_the_same_way_and_the_likeliest_action_is_no_draw():
 
 
 def test_it_wants_what_its_network_takes():
-    assert make_agent(hears=False).wants(RULES) == ("feature",)
-    assert make_agent(maps=True).wants(RULES) == ("feature", "sound_feature", "window")
+    assert make_agent(hears=False).wants(RULES) == ("visual_embedding",)
+    assert make_agent(maps=True).wants(RULES) == (
+        "visual_embedding",
+        "audio_embedding",
+        "local_patch",
+    )
     assert make_agent(memory=4).explores
     assert not make_agent().explores
 
@@ -93,7 +101,7 @@ def test_an_agent_with_memory_begins_with_what_its_walk_left_it():
     h, c = agent.network.no_memory(1)
     with torch.no_grad():
         for state in episodes.walks[0]:
-            seen = {"feature": observed.visual["feature"][int(state)][None]}
+            seen = {"visual_embedding": observed.visual["visual_embedding"][int(state)][None]}
             _, h, c = agent.network.remember(agent.network.embed(seen), h, c)
     assert torch.allclose(begun[0], h.expand_as(begun[0]), atol=1e-5)
     assert np.all(episodes.walk == 0)

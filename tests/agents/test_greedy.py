@@ -4,7 +4,7 @@ import torch
 from tensordict import TensorDict
 
 from avn.agents.greedy import Greedy
-from avn.agents.rollout import Labels, walk_room
+from avn.agents.rollout import Labels, rollout_scene
 from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes
 from avn.navigation.observations import SceneObservations
@@ -21,7 +21,9 @@ def begin(agent: Greedy, n: int, protocol: Protocol) -> Greedy:
 
 
 def hearing(*locations: tuple[float, float]) -> TensorDict:
-    return TensorDict({"sound": torch.tensor(locations).float()}, batch_size=[len(locations)])
+    return TensorDict(
+        {"source_estimate": torch.tensor(locations).float()}, batch_size=[len(locations)]
+    )
 
 
 def true_hearing(place: DrawnPlace) -> SceneObservations:
@@ -32,7 +34,7 @@ def true_hearing(place: DrawnPlace) -> SceneObservations:
     right = np.stack((east, -north, -east, north), axis=-1)
     front = np.stack((north, east, -north, -east), axis=-1)
     table = np.stack((right, front), axis=-1).reshape(len(place.sources), -1, 1, 1, 2)
-    return SceneObservations({"sound": torch.from_numpy(table).float()})
+    return SceneObservations({"source_estimate": torch.from_numpy(table).float()})
 
 
 def test_turns_to_the_larger_part_and_walks(protocol: Protocol) -> None:
@@ -54,7 +56,7 @@ def test_stops_within_reach_only_where_it_may(protocol: Protocol) -> None:
 
 def test_does_not_turn_for_ever(protocol: Protocol) -> None:
     # What is heard is to the right whichever way it turns.
-    agent = begin(Greedy(patience=3), 1, protocol)
+    agent = begin(Greedy(max_rotations=3), 1, protocol)
     actions = [agent.act(hearing((5.0, 0.0))).item() for _ in range(8)]
     assert actions == [RIGHT, RIGHT, RIGHT, FORWARD, RIGHT, RIGHT, RIGHT, FORWARD]
 
@@ -63,7 +65,7 @@ def test_with_true_hearing_it_arrives_in_an_empty_room(
     hall: DrawnPlace, protocol: Protocol
 ) -> None:
     episodes = exhaustive_episodes(hall, ["ring"], protocol, seed=0)
-    frame = walk_room(Greedy(), hall, episodes, protocol, LABELS, true_hearing(hall))
+    frame = rollout_scene(Greedy(), hall, episodes, protocol, LABELS, true_hearing(hall))
     assert (frame["collisions"] == 0).all()
     assert (frame["success"] == 1).all()
     assert (frame["spl"] == 1.0).all()
@@ -71,7 +73,7 @@ def test_with_true_hearing_it_arrives_in_an_empty_room(
 
 def test_it_is_blind_to_walls(flat: DrawnPlace, protocol: Protocol) -> None:
     episodes = exhaustive_episodes(flat, ["ring"], protocol, seed=0)
-    frame = walk_room(Greedy(), flat, episodes, protocol, LABELS, true_hearing(flat))
+    frame = rollout_scene(Greedy(), flat, episodes, protocol, LABELS, true_hearing(flat))
     near, far = frame["rooms_crossed"] == 0, frame["rooms_crossed"] > 0
     assert frame["success"][near].mean() > frame["success"][far].mean() + 0.2
     assert frame["collisions"][far].mean() > 1
@@ -80,10 +82,10 @@ def test_it_is_blind_to_walls(flat: DrawnPlace, protocol: Protocol) -> None:
 def test_wrong_options_name_their_key() -> None:
     with pytest.raises(UserError, match=r"baseline\.slack"):
         Greedy(slack=-1.0)
-    with pytest.raises(UserError, match=r"baseline\.patience"):
-        Greedy(patience=0)
+    with pytest.raises(UserError, match=r"baseline\.max_rotations"):
+        Greedy(max_rotations=0)
 
 
 def test_greedy_is_not_privileged() -> None:
     assert not Greedy.privileged
-    assert Greedy.needs == ("sound",)
+    assert Greedy.needs == ("source_estimate",)

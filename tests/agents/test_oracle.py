@@ -1,7 +1,7 @@
 import dataclasses
 
 from avn.agents.oracle import Oracle
-from avn.agents.rollout import Labels, walk_room
+from avn.agents.rollout import Labels, rollout_scene
 from avn.navigation.episodes import exhaustive_episodes
 from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
@@ -11,23 +11,23 @@ LABELS = Labels("oracle", "resonance")
 
 def test_oracle_is_perfect_from_every_start(flat: DrawnPlace, protocol: Protocol) -> None:
     episodes = exhaustive_episodes(flat, ["ring"], protocol, seed=0)
-    frame = walk_room(Oracle(), flat, episodes, protocol, LABELS)
+    frame = rollout_scene(Oracle(), flat, episodes, protocol, LABELS)
     assert len(frame) > 1000
     assert (frame["success"] == 1).all()
     assert (frame["spl"] == 1.0).all()
     assert (frame["sna"] == 1.0).all()
     assert (frame["actions"] == frame["fewest_actions"]).all()
     assert (frame["collisions"] == 0).all()
-    if protocol.path == "attempted":
+    if protocol.path_length == "moves":
         assert (frame["softspl"] == 1.0).all()
 
 
 def test_oracle_does_not_go_round_to_save_turns(flat: DrawnPlace, protocol: Protocol) -> None:
     # However wide the goal is, the walk is never longer than the shortest one to the source.
-    wide = dataclasses.replace(protocol, goal="radius", radius=1.5, path="walked")
+    wide = dataclasses.replace(protocol, goal="radius", radius=1.5, path_length="metres")
     episodes = exhaustive_episodes(flat, ["ring"], wide, seed=0)
-    frame = walk_room(Oracle(), flat, episodes, wide, LABELS)
-    assert (frame["path"] <= frame["geodesic"]).all()
+    frame = rollout_scene(Oracle(), flat, episodes, wide, LABELS)
+    assert (frame["path_length"] <= frame["geodesic"]).all()
     assert (frame["spl"] == 1.0).all()
 
 

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from avn.agents.planner_agent import PlannerAgent
-from avn.agents.rollout import Labels, walk_room
+from avn.agents.rollout import Labels, rollout_scene
 from avn.apartments.local_patch import window_cells
 from avn.core.errors import UserError
 from avn.dataset.source_locations import relative_locations
@@ -30,9 +30,16 @@ aaaaaaa#bbbbbbbb
 """
 LABELS = Labels("ours", "resonance")
 VAR = Protocol(
-    name="var", goal="box", says_stop=False, path="attempted", moves_factor=2.0, exploration=0
+    name="var",
+    goal="box",
+    requires_stop=False,
+    path_length="moves",
+    max_moves_ratio=2.0,
+    exploration_steps=0,
 )
-STOP = Protocol(name="stop", goal="radius", says_stop=True, path="walked", exploration=0)
+STOP = Protocol(
+    name="stop", goal="radius", requires_stop=True, path_length="metres", exploration_steps=0
+)
 
 
 def flat() -> DrawnPlace:
@@ -45,8 +52,8 @@ def truth(place: DrawnPlace, protocol: Protocol = VAR) -> dict[str, Tensor]:
     sources = torch.from_numpy(np.asarray(place.sources)).long()
     goal = torch.from_numpy(protocol.goal_cells(place.grid, np.asarray(place.sources)))
     return {
-        "sound": relative_locations(lattice, sources)[:, :, None, None],
-        "reach": goal.repeat_interleave(4, dim=1)[:, :, None, None].float(),
+        "source_estimate": relative_locations(lattice, sources)[:, :, None, None],
+        "stop_probability": goal.repeat_interleave(4, dim=1)[:, :, None, None].float(),
     }
 
 
@@ -66,21 +73,23 @@ def looks(place: DrawnPlace) -> Tensor:
 
 
 def run(agent: PlannerAgent, place: DrawnPlace, protocol: Protocol = VAR) -> pd.DataFrame:
-    seen = {"window": windows(place), "feature": looks(place)}
+    seen = {"local_patch": windows(place), "visual_embedding": looks(place)}
     if agent.explores:
         episodes = frozen_episodes(place, ["ring"], protocol, seed=0)
     else:
         episodes = exhaustive_episodes(place, ["ring"], protocol, seed=0)
-    return walk_room(
+    return rollout_scene(
         agent, place, episodes, protocol, LABELS, SceneObservations(truth(place, protocol), seen)
     )
 
 
 @pytest.mark.parametrize("protocol", [VAR, STOP], ids=["var", "stop"])
 @pytest.mark.parametrize("look", ["once", "around"])
-@pytest.mark.parametrize("source", ["newest", "belief"])
+@pytest.mark.parametrize("source", ["latest", "bayes"])
 def test_with_true_senses_it_always_arrives(protocol: Protocol, look: str, source: str) -> None:
-    frame = run(PlannerAgent(OccupancyMapper(41), look=look, source=source), flat(), protocol)
+    frame = run(
+        PlannerAgent(OccupancyMapper(41), look=look, source_filter=source), flat(), protocol
+    )
     assert frame["success"].mean() > 0.99
     assert frame["spl"].mean() > 0.8
     assert frame["collisions"].sum() == 0
@@ -88,7 +97,7 @@ def test_with_true_senses_it_always_arrives(protocol: Protocol, look: str, sourc
 
 def test_shown_the_map_it_walks_the_shortest_way() -> None:
     blind = run(PlannerAgent(OccupancyMapper(41)), flat())
-    shown = run(PlannerAgent(OccupancyMapper(41), truth=["map"]), flat())
+    shown = run(PlannerAgent(OccupancyMapper(41), oracle_inputs=["map"]), flat())
     assert shown["spl"].mean() == pytest.approx(1.0, abs=0.01)
     assert blind["spl"].mean() < shown["spl"].mean()
 
@@ -97,16 +106,16 @@ def test_around_sees_every_heading_before_it_walks_on() -> None:
     frame = run(PlannerAgent(OccupancyMapper(41), look="around"), flat())
     once = run(PlannerAgent(OccupancyMapper(41)), flat())
     # Three turns more a place at the least, and rotations are free.
-    assert (frame["actions"] - frame["path"]).mean() > 2 * frame["path"].mean()
-    assert (once["actions"] - once["path"]).mean() < once["path"].mean() + 2
+    assert (frame["actions"] - frame["path_length"]).mean() > 2 * frame["path_length"].mean()
+    assert (once["actions"] - once["path_length"]).mean() < once["path_length"].mean() + 2
 
 
 def test_a_wall_that_it_cannot_see_is_found_by_running_into_it_once() -> None:
     corridor = draw("corridor", "aaaaaaaa\naaaa#aaa\n####aaaA")
-    blind = {"window": torch.full((4 * corridor.grid.cells, 5, 5), torch.nan)}
+    blind = {"local_patch": torch.full((4 * corridor.grid.cells, 5, 5), torch.nan)}
     episodes = exhaustive_episodes(corridor, ["ring"], VAR, seed=0)
     agent = PlannerAgent(OccupancyMapper(41))
-    frame = walk_room(
+    frame = rollout_scene(
         agent, corridor, episodes, VAR, LABELS, SceneObservations(truth(corridor), blind)
     )
     assert frame["success"].mean() > 0.8
@@ -120,18 +129,22 @@ def test_it_holds_to_a_source_that_it_hears_elsewhere_from_each_side() -> None:
     sound = torch.tensor([[0.0, -2.0]]).expand(1, 4 * 9, 1, 1, 2)
     episodes = exhaustive_episodes(hall, ["ring"], VAR, seed=0)
     agent = PlannerAgent(OccupancyMapper(41))
-    observed = SceneObservations({"sound": sound}, {"window": windows(hall)})
-    frame = walk_room(agent, hall, episodes, VAR, LABELS, observed)
+    observed = SceneObservations({"source_estimate": sound}, {"local_patch": windows(hall)})
+    frame = rollout_scene(agent, hall, episodes, VAR, LABELS, observed)
     assert frame["actions"].max() < 300
-    assert frame["path"].min() > 0
+    assert frame["path_length"].min() > 0
 
 
 def test_it_finds_itself_by_retrieval_and_walks_its_memory() -> None:
     place = flat()
-    rules = dataclasses.replace(VAR, exploration=150)
-    known = run(PlannerAgent(MemoryMapper(41), detour=4.0), place, rules)
-    lost = run(PlannerAgent(MemoryMapper(41, localisation="retrieval"), detour=4.0), place, rules)
-    true = run(PlannerAgent(MemoryMapper(41), detour=4.0, truth=["pose"]), place, rules)
+    rules = dataclasses.replace(VAR, exploration_steps=150)
+    known = run(PlannerAgent(MemoryMapper(41), collision_cost=4.0), place, rules)
+    lost = run(
+        PlannerAgent(MemoryMapper(41, localisation="retrieval"), collision_cost=4.0), place, rules
+    )
+    true = run(
+        PlannerAgent(MemoryMapper(41), collision_cost=4.0, oracle_inputs=["pose"]), place, rules
+    )
     assert true["success"].mean() >= known["success"].mean() - 0.05
     assert known["success"].mean() > 0.6
     assert known["spl"].mean() > lost["spl"].mean()
@@ -142,24 +155,28 @@ def test_without_a_walk_a_memory_is_refused() -> None:
     place, agent = flat(), PlannerAgent(MemoryMapper(41))
     episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
     with pytest.raises(UserError, match="explores first, and these episodes have no exploration"):
-        walk_room(
+        rollout_scene(
             agent,
             place,
             episodes,
             VAR,
             LABELS,
-            SceneObservations(truth(place), {"feature": looks(place)}),
+            SceneObservations(truth(place), {"visual_embedding": looks(place)}),
         )
 
 
 def test_a_missing_sense_is_named() -> None:
     place, agent = flat(), PlannerAgent(OccupancyMapper(41))
     episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
-    with pytest.raises(UserError, match="needs the observation 'window', which is not there"):
-        walk_room(agent, place, episodes, VAR, LABELS, SceneObservations(truth(place)))
-    observed = SceneObservations({"sound": truth(place)["sound"]}, {"window": windows(place)})
-    with pytest.raises(UserError, match="needs the observation 'reach', which is not there"):
-        walk_room(
+    with pytest.raises(UserError, match="needs the observation 'local_patch', which is not there"):
+        rollout_scene(agent, place, episodes, VAR, LABELS, SceneObservations(truth(place)))
+    observed = SceneObservations(
+        {"source_estimate": truth(place)["source_estimate"]}, {"local_patch": windows(place)}
+    )
+    with pytest.raises(
+        UserError, match="needs the observation 'stop_probability', which is not there"
+    ):
+        rollout_scene(
             agent, place, exhaustive_episodes(place, ["ring"], STOP, 0), STOP, LABELS, observed
         )
 
@@ -167,17 +184,19 @@ def test_a_missing_sense_is_named() -> None:
 def test_settings_that_cannot_work_are_refused() -> None:
     with pytest.raises(UserError, match=r"look: 'twice' is none of once, around"):
         PlannerAgent(OccupancyMapper(), look="twice")
-    with pytest.raises(UserError, match=r"agent.truth: 'goal' is none of location, window"):
-        PlannerAgent(OccupancyMapper(), truth=["goal"])
-    with pytest.raises(UserError, match=r"planner.blocked_below: 0.7; give 0 to 0.5"):
-        PlannerAgent(OccupancyMapper(), blocked_below=0.7)
+    with pytest.raises(
+        UserError, match=r"agent.oracle_inputs: 'goal' is none of source_estimate, local_patch"
+    ):
+        PlannerAgent(OccupancyMapper(), oracle_inputs=["goal"])
+    with pytest.raises(UserError, match=r"planner.obstacle_threshold: 0.7; give 0 to 0.5"):
+        PlannerAgent(OccupancyMapper(), obstacle_threshold=0.7)
     with pytest.raises(UserError, match=r"localisation: 'gps' is none of retrieval"):
         MemoryMapper(localisation="gps")
 
 
 def test_only_who_is_given_the_truth_is_privileged() -> None:
     assert not PlannerAgent(OccupancyMapper()).privileged
-    assert PlannerAgent(OccupancyMapper(), truth=["window"]).privileged
+    assert PlannerAgent(OccupancyMapper(), oracle_inputs=["local_patch"]).privileged
 
 
 @pytest.mark.parametrize(("backward", "turns"), [(False, 2), (True, 0)])
@@ -186,15 +205,15 @@ def test_what_lies_behind_is_walked_backward_only_where_that_is_allowed(
 ) -> None:
     corridor = draw("corridor", "Aaaaaaaa")
     episodes = exhaustive_episodes(corridor, ["ring"], VAR, seed=0)
-    frame = walk_room(
+    frame = rollout_scene(
         PlannerAgent(OccupancyMapper(41), backward=backward),
         corridor,
         episodes,
         VAR,
         LABELS,
-        SceneObservations(truth(corridor), {"window": windows(corridor)}),
+        SceneObservations(truth(corridor), {"local_patch": windows(corridor)}),
     )
     east = frame[(frame["start_heading"] == 1) & (frame["start_cell"] > 4)]
     assert east["success"].all()
-    assert (east["path"] == east["start_cell"] - 1).all()  # to the cell beside the source
-    assert (east["actions"] - east["path"] == turns).all()
+    assert (east["path_length"] == east["start_cell"] - 1).all()  # to the cell beside the source
+    assert (east["actions"] - east["path_length"] == turns).all()

@@ -33,13 +33,15 @@ def test_a_trace_is_the_walk_that_the_records_tell_of() -> None:
 def test_the_takes_are_those_that_the_simulator_lets_hear() -> None:
     place = flat()
     # what is heard tells which take it is
-    takes = torch.arange(TAKES).float().expand(len(place.sources), 4 * place.grid.cells, 1, -1)
-    world = simulator(place, torch.stack((takes, torch.zeros_like(takes)), dim=-1))
+    realisations = (
+        torch.arange(TAKES).float().expand(len(place.sources), 4 * place.grid.cells, 1, -1)
+    )
+    world = simulator(place, torch.stack((realisations, torch.zeros_like(realisations)), dim=-1))
     told: list[Tensor] = []
 
     class Ears(RandomWalk):
         def act(self, observation: TensorDict) -> Tensor:
-            told.append(observation["sound"][:, 0])
+            told.append(observation["source_estimate"][:, 0])
             return super().act(observation)
 
     recorder = Recorder({"flat": [1, 4]}, TAKES, thoughts=False)
@@ -47,7 +49,7 @@ def test_the_takes_are_those_that_the_simulator_lets_hear() -> None:
     for row in (1, 4):
         trace = recorder.trace("flat", row, {})
         heard = [int(step[row]) for step in told[: len(trace.action)]]
-        assert trace.take[:-1].tolist() == heard
+        assert trace.realisation[:-1].tolist() == heard
         assert len(set(heard)) > 1
 
 

@@ -8,7 +8,7 @@ from torch import Tensor
 from avn.agents.base import Agent
 from avn.agents.greedy import Greedy
 from avn.agents.random_walk import RandomWalk
-from avn.agents.rollout import Labels, records, walk, walk_room
+from avn.agents.rollout import Labels, records, rollout_scene, walk
 from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
 from avn.navigation.observations import SceneObservations
@@ -29,7 +29,7 @@ class Forward(Agent):
 
     def act(self, observation: TensorDict) -> Tensor:
         self.seen.append(observation)
-        stops = self.protocol.says_stop and len(self.seen) > self.steps
+        stops = self.protocol.requires_stop and len(self.seen) > self.steps
         return torch.full((self.n,), 4 if stops else 0)
 
 
@@ -39,17 +39,17 @@ def row_of(frame: pd.DataFrame, cell: int, heading: int) -> pd.Series:
 
 def test_records_under_var_by_hand(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
-    frame = walk_room(Forward(), corridor, episodes, protocols["var"], LABELS)
+    frame = rollout_scene(Forward(), corridor, episodes, protocols["var"], LABELS)
     assert tuple(frame.columns) == EPISODE_COLUMNS
     assert len(frame) == 36
     arrived = row_of(frame, cell=4, heading=3)
     assert arrived["outcome"] == "success"
-    assert (arrived["path"], arrived["shortest"], arrived["fewest_actions"]) == (3, 3, 3)
+    assert (arrived["path_length"], arrived["shortest"], arrived["fewest_actions"]) == (3, 3, 3)
     assert (arrived["spl"], arrived["softspl"], arrived["sna"]) == (1, 1, 1)
     assert (arrived["geodesic"], arrived["euclidean"], arrived["dtg"]) == (2.0, 2.0, 0.5)
     # East, against the end of the corridor until twice ten moves are attempted.
     lost = row_of(frame, cell=10, heading=1)
-    assert (lost["outcome"], lost["path"], lost["collisions"]) == ("out_of_moves", 20, 20)
+    assert (lost["outcome"], lost["path_length"], lost["collisions"]) == ("out_of_moves", 20, 20)
     assert (lost["spl"], lost["softspl"], lost["sna"], lost["dtg"]) == (0, 0, 0, 5.0)
     # Facing away it takes no turn: backward moves do. Facing north it takes one.
     assert row_of(frame, cell=10, heading=1)["fewest_actions"] == 9
@@ -58,10 +58,14 @@ def test_records_under_var_by_hand(corridor: DrawnPlace, protocols: dict[str, Pr
 
 def test_records_under_stop_by_hand(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["stop"], seed=0)
-    frame = walk_room(Forward(3), corridor, episodes, protocols["stop"], LABELS)
+    frame = rollout_scene(Forward(3), corridor, episodes, protocols["stop"], LABELS)
     arrived = row_of(frame, cell=4, heading=3)
     # Three of four moves to the source, 1.5 m of 2.0 m; two moves and Stop would have done.
-    assert (arrived["outcome"], arrived["path"], arrived["shortest"]) == ("success", 1.5, 2.0)
+    assert (arrived["outcome"], arrived["path_length"], arrived["shortest"]) == (
+        "success",
+        1.5,
+        2.0,
+    )
     assert (arrived["actions"], arrived["fewest_actions"]) == (4, 3)
     assert (arrived["spl"], arrived["softspl"], arrived["sna"]) == (1.0, 0.75, 0.75)
     assert arrived["dtg"] == 0.5
@@ -72,7 +76,7 @@ def test_records_under_stop_by_hand(corridor: DrawnPlace, protocols: dict[str, P
 
 def test_out_of_actions(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["stop"], seed=0)
-    frame = walk_room(Forward(), corridor, episodes, protocols["stop"], LABELS)
+    frame = rollout_scene(Forward(), corridor, episodes, protocols["stop"], LABELS)
     assert set(frame["outcome"]) == {"out_of_actions"}
     assert set(frame["actions"]) == {500}
 
@@ -81,7 +85,7 @@ def test_records_name_sight_rooms_and_sounds(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring", "clock"], protocols["var"], seed=5)
-    frame = walk_room(RandomWalk(), two_rooms, episodes, protocols["var"], LABELS)
+    frame = rollout_scene(RandomWalk(), two_rooms, episodes, protocols["var"], LABELS)
     assert len(frame) == 2 * 2 * 20
     assert frame["sound"].value_counts().to_dict() == {"ring": 40, "clock": 40}
     assert set(frame["seed"]) == {5}
@@ -97,7 +101,7 @@ def test_records_name_sight_rooms_and_sounds(
 def test_same_seed_same_records(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
     rules = protocols["var"]
     first, again, other = (
-        walk_room(
+        rollout_scene(
             RandomWalk(),
             two_rooms,
             frozen_episodes(two_rooms, ["ring"], rules, seed),
@@ -125,7 +129,7 @@ def test_unprivileged_agents_get_observations_alone(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring"], protocols["stop"], seed=0)
-    heard = SceneObservations({"sound": torch.rand(2, 204, 1, 1, 2)})
+    heard = SceneObservations({"source_estimate": torch.rand(2, 204, 1, 1, 2)})
     simulator = Simulator(two_rooms, episodes, protocols["stop"], heard)
     agent = Curious()
     walk(agent, simulator)
@@ -133,7 +137,7 @@ def test_unprivileged_agents_get_observations_alone(
     assert len(agent.given) == 500
     for given in agent.given:
         assert isinstance(given, TensorDict)
-        assert set(given.keys()) == {"sound", "collided", "odometry"}
+        assert set(given.keys()) == {"source_estimate", "collided", "odometry"}
     with pytest.raises(PermissionError, match="may not see the truth"):
         agent.reveal(simulator)
 
@@ -162,13 +166,15 @@ def test_agents_do_not_know_the_numbers_of_states(
     hearing = 4 * torch.randn(2, 204, 1, 1, 2, generator=torch.Generator().manual_seed(0))
     episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
     moved = type(episodes)(**{**vars(episodes), "start": np.argsort(states)[episodes.start]})
-    first = Simulator(two_rooms, episodes, rules, SceneObservations({"sound": hearing}))
-    second = Simulator(other, moved, rules, SceneObservations({"sound": hearing[:, states]}))
+    first = Simulator(two_rooms, episodes, rules, SceneObservations({"source_estimate": hearing}))
+    second = Simulator(
+        other, moved, rules, SceneObservations({"source_estimate": hearing[:, states]})
+    )
     walk(agent, first)
     walk(agent, second)
     assert (torch.from_numpy(states)[second.state] == first.state).all()
     assert (first.state != first.start).any()
-    columns = ["success", "path", "actions", "collisions", "spl", "softspl", "sna", "dtg"]
+    columns = ["success", "path_length", "actions", "collisions", "spl", "softspl", "sna", "dtg"]
     frames = [records(simulator, LABELS)[columns] for simulator in (first, second)]
     pd.testing.assert_frame_equal(*frames)
 
@@ -177,5 +183,7 @@ def test_an_agent_without_what_it_needs_is_refused(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
-    with pytest.raises(UserError, match="needs the observation 'sound', which is not there"):
-        walk_room(Greedy(), two_rooms, episodes, protocols["var"], LABELS)
+    with pytest.raises(
+        UserError, match="needs the observation 'source_estimate', which is not there"
+    ):
+        rollout_scene(Greedy(), two_rooms, episodes, protocols["var"], LABELS)

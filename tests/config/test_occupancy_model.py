@@ -4,7 +4,7 @@ import pytest
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
-from avn.config import schema
+from avn.config import registry
 from avn.config.folder import conf_folder
 
 
@@ -17,14 +17,14 @@ from avn.config.folder import conf_folder
         (["agent=ours_noexp", "occupancy_model=released"], "released", 30),
         (["agent=ours_noexp", "occupancy_model.epochs=2"], "small", 2),
         (["agent=ours_exp"], "none", None),
-        (["agent=ours_exp", "occupancy_model=small", "mapper.windows=true"], "small", 5),
+        (["agent=ours_exp", "occupancy_model=small", "mapper.local_patches=true"], "small", 5),
         (["agent=a3c_va", "mapper=occupancy"], "small", 5),
         (["agent=ours_noexp", "mapper=none"], "none", None),
     ],
 )
 def test_which_network_sees_free_cells(overrides, network, epochs):
     GlobalHydra.instance().clear()
-    schema.register()
+    registry.register()
     with initialize_config_dir(str(conf_folder().resolve()), version_base="1.3"):
         cfg = compose("eval", overrides=overrides)
     assert cfg.occupancy_model.name == network

@@ -3,7 +3,7 @@
 import pytest
 
 
-def refusal(command, *arguments):
+def missing_error(command, *arguments):
     code, out, err = command(*arguments)
     assert code == 2, out
     assert len(err) == 1, err
@@ -13,29 +13,29 @@ def refusal(command, *arguments):
 @pytest.mark.parametrize(
     ("arguments", "key"),
     [
-        (("agent=greedy", "planner.detour=9"), "planner.detour"),
+        (("agent=greedy", "planner.collision_cost=9"), "planner.collision_cost"),
         (("agent=greedy", "look=nonsense"), "look"),
         (("agent=greedy", "look=around"), "look"),
         (("agent=greedy", "localisation=retrieval"), "localisation"),
         (("agent=greedy", "mapper.size=51"), "mapper.size"),
-        (("agent=greedy", "a3c.total=5"), "a3c.total"),
+        (("agent=greedy", "algorithm.total_steps=5"), "algorithm.total_steps"),
         (("agent=greedy", "occupancy_model=small"), "occupancy_model"),
         (("agent=greedy", "renderer=cycles"), "renderer"),
         (("agent=greedy", "backbone.size=64"), "backbone.size"),
         (("agent=greedy", "protocol.radius=2"), "protocol.radius"),
-        (("agent=ours_noexp", "a3c.total=5"), "a3c.total"),
-        (("agent=ours_noexp", "planner.error.near=2"), "planner.error.near"),
+        (("agent=ours_noexp", "algorithm.total_steps=5"), "algorithm.total_steps"),
+        (("agent=ours_noexp", "planner.error.sigma=2"), "planner.error.sigma"),
         (("agent=ours_noexp", "stop_model.epochs=2"), "stop_model.epochs"),
         (("agent=ours_noexp", "localisation=retrieval"), "localisation"),
-        (("agent=ours_noexp", "agent.truth=[location]", "agent.privileged=true",
+        (("agent=ours_noexp", "agent.oracle_inputs=[source_estimate]", "agent.privileged=true",
           "sound_model=released"), "sound_model"),
         (("agent=a3c_va", "mapper=spatial_memory"), "mapper"),
         (("agent=a3c_va_mapper", "mapper=spatial_memory", "occupancy_model=small"), "mapper"),
         (("agent=a3c_va", "baseline.map_width=11"), "baseline.map_width"),
-        (("agent=a3c_va", "a3c.walks=3"), "a3c.walks"),
+        (("agent=a3c_va", "algorithm.exploration_walks=3"), "algorithm.exploration_walks"),
         (("agent=a3c_v", "sound_model.epochs=2"), "sound_model.epochs"),
         (("agent=random_walk", "train_seed=3"), "train_seed"),
-        (("agent=random_walk", "takes=2"), "takes"),
+        (("agent=random_walk", "realisations=2"), "realisations"),
         (("agent=random_walk", "acoustics.rays=300"), "acoustics.rays"),
         (("agent=random_walk", "microphone.gain=2"), "microphone.gain"),
         (("agent=random_walk", "training.acoustics=diffraction"), "training.acoustics"),
@@ -44,7 +44,7 @@ def refusal(command, *arguments):
     ],
 )  # fmt: skip
 def test_a_run_refuses_what_it_does_not_read(command, tmp_path, arguments, key):
-    line = refusal(command, "eval", "split=mini", *arguments, f"outputs={tmp_path}/o")
+    line = missing_error(command, "eval", "split=mini", *arguments, f"outputs={tmp_path}/o")
     if key:
         assert line.startswith(f"avn.eval: {key}: not read by this run")
         assert "; the run reads " in line
@@ -58,15 +58,15 @@ def test_a_run_refuses_what_it_does_not_read(command, tmp_path, arguments, key):
         (("train", "model=sound_cnn", "protocol=stop"), "protocol"),
         (("train", "model=sound_cnn", "microphone.gain=2"), "microphone.gain"),
         (("train", "model=occupancy_cnn", "acoustics=diffraction"), "acoustics"),
-        (("generate", "planner.detour=3"), "planner.detour"),
+        (("generate", "planner.collision_cost=3"), "planner.collision_cost"),
         (("generate", "sound=alarm"), "sound"),
-        (("generate", "takes=3"), "takes"),
+        (("generate", "realisations=3"), "realisations"),
         (("reproduce", "rows=random_walk,oracle", "sound_model=released"), "sound_model"),
-        (("reproduce", "rows=greedy", "planner.detour=3"), "planner.detour"),
+        (("reproduce", "rows=greedy", "planner.collision_cost=3"), "planner.collision_cost"),
     ],
 )
 def test_so_do_the_other_commands(command, tmp_path, arguments, key):
-    line = refusal(command, *arguments, "split=mini", f"outputs={tmp_path}/o")
+    line = missing_error(command, *arguments, "split=mini", f"outputs={tmp_path}/o")
     assert line.startswith(f"avn.{arguments[0]}: {key}: not read by this run")
     assert not list((tmp_path / "o").rglob("*"))
 
@@ -74,7 +74,7 @@ def test_so_do_the_other_commands(command, tmp_path, arguments, key):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("agent=greedy", "planner.detour=0"),  # its default
+        ("agent=greedy", "localisation=retrieval+odometry"),  # its default
         ("agent=greedy", "train_seed=0"),
         ("agent=random_walk", "acoustics=diffraction"),  # a column of the records
         ("agent=random_walk", "sound=alarm"),
@@ -90,12 +90,12 @@ def test_what_is_read_or_changes_nothing_is_taken(command, outputs, arguments):
 
 
 def test_a_table_takes_what_one_of_its_rows_reads(command, tmp_path):
-    options = ("split=mini", "planner.detour=3", "auto=false", f"outputs={tmp_path}/o")
-    line = refusal(command, "reproduce", "rows=random_walk,ours_noexp", *options)
+    options = ("split=mini", "planner.collision_cost=3", "auto=false", f"outputs={tmp_path}/o")
+    line = missing_error(command, "reproduce", "rows=random_walk,ours_noexp", *options)
     assert "is missing and auto=false" in line
 
 
 def test_the_test_world_is_not_changed_through_the_training_world(command, tmp_path):
     options = ("agent=greedy", "training.acoustics.rays=300", f"outputs={tmp_path}/o")
-    line = refusal(command, "eval", *options)
+    line = missing_error(command, "eval", *options)
     assert "choose its own first, such as training.acoustics=resonance" in line

@@ -4,7 +4,7 @@ import time
 import pytest
 import torch
 
-from avn.core.prefetch import AheadLoader, made_ahead, threads_for_one_operation
+from avn.core.prefetch import PrefetchLoader, prefetch, threads_for_one_operation
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -13,7 +13,7 @@ def test_results_come_in_order(threads: int) -> None:
         time.sleep(0.002 * (part % 3))  # later ones are ready first
         return part * part
 
-    assert list(made_ahead(make, range(20), threads)) == [part * part for part in range(20)]
+    assert list(prefetch(make, range(20), threads)) == [part * part for part in range(20)]
 
 
 def test_work_runs_ahead_in_threads_but_not_far() -> None:
@@ -25,7 +25,7 @@ def test_work_runs_ahead_in_threads_but_not_far() -> None:
         names.add(threading.current_thread())
         return part
 
-    results = made_ahead(make, range(100), 2)
+    results = prefetch(make, range(100), 2)
     assert next(results) == 0
     deadline = time.monotonic() + 5
     while len(started) < 3 and time.monotonic() < deadline:
@@ -40,7 +40,7 @@ def test_an_error_reaches_who_asks() -> None:
     def make(part: int) -> float:
         return 1 / (2 - part)
 
-    results = made_ahead(make, range(5), 2)
+    results = prefetch(make, range(5), 2)
     assert [next(results), next(results)] == [0.5, 1.0]
     with pytest.raises(ZeroDivisionError):
         next(results)
@@ -55,7 +55,7 @@ class _Squares(torch.utils.data.Dataset):
 
 
 def test_loader_gives_the_dataset_s_batches() -> None:
-    loader = AheadLoader(_Squares(), 2, batch_size=4, sampler=[9, 0, 3, 2, 5])
+    loader = PrefetchLoader(_Squares(), 2, batch_size=4, sampler=[9, 0, 3, 2, 5])
     assert len(loader) == 2
     for _ in range(2):
         assert [batch.tolist() for batch in loader] == [[81, 0, 9, 4], [25]]

@@ -1,24 +1,24 @@
 import pytest
 import torch
+from small import option
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
 from avn.core.errors import UserError
-from avn.datamodules.sound import ClipSet, FreshTakes, SoundData
+from avn.datamodules.sound import ClipSampler, ClipSet, SoundData
 from avn.dataset.source_locations import relative_locations
-from avn.modules.sound_cnn import SoundModelConfig
 
 
 @pytest.fixture(scope="module")
 def clips() -> ClipSet:
     scenes = [synthetic_scene("a"), synthetic_scene("b", 2.5)]
-    return ClipSet(scenes, synthetic_sounds(), MicrophoneConfig(), "train", 1)
+    return ClipSet(scenes, synthetic_sounds(), Microphone(), "train", 1)
 
 
 def data(**changes: int) -> SoundData:
-    recipe = SoundModelConfig(name="test", batch=16, validation_clips=50, **changes)
+    recipe = option("sound_model", "cnn5", batch=16, validation_clips=50, **changes)
     scenes = [synthetic_scene("a")], [synthetic_scene("b", 2.5)]
-    return SoundData(*scenes, synthetic_sounds(), MicrophoneConfig(), recipe)
+    return SoundData(*scenes, synthetic_sounds(), Microphone(), recipe)
 
 
 def test_relative_location_of_the_documented_example() -> None:
@@ -55,7 +55,7 @@ def test_a_clip_does_not_depend_on_its_batch(clips: ClipSet) -> None:
 
 def test_a_clip_is_its_response_heard() -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    quiet = MicrophoneConfig(noise_rms=0.0)
+    quiet = Microphone(noise_rms=0.0)
     clips = ClipSet([scene], sounds, quiet, "train", 1)
     # Facing the source from far and from near: level falls as the formula says.
     batch = clips.__getitems__(clips.item(torch.arange(clips.pairs), torch.tensor(0), 0).tolist())
@@ -72,17 +72,19 @@ def test_a_clip_is_its_response_heard() -> None:
 
 def test_training_takes_are_fresh_and_apart_from_evaluation(clips: ClipSet) -> None:
     pair, sound = torch.tensor([4]), torch.tensor([0])
-    takes = [clips.__getitems__(clips.item(pair, sound, t).tolist())["clips"] for t in (0, 1)]
-    assert not torch.allclose(*takes, atol=1e-3)
+    realisations = [
+        clips.__getitems__(clips.item(pair, sound, t).tolist())["clips"] for t in (0, 1)
+    ]
+    assert not torch.allclose(*realisations, atol=1e-3)
     scenes = [synthetic_scene("a"), synthetic_scene("b", 2.5)]
-    others = ClipSet(scenes, clips.sounds, MicrophoneConfig(), "eval", 1)
+    others = ClipSet(scenes, clips.sounds, Microphone(), "eval", 1)
     other = others.__getitems__(others.item(pair, sound, 0).tolist())["clips"]
-    assert not torch.allclose(takes[0], other, atol=1e-3)
+    assert not torch.allclose(realisations[0], other, atol=1e-3)
 
 
 @pytest.mark.parametrize("sounds_per_pair", [1, 2])
 def test_an_epoch_hears_every_pair_in_its_own_take(clips: ClipSet, sounds_per_pair: int) -> None:
-    sampler = FreshTakes(clips, 7, sounds_per_pair)
+    sampler = ClipSampler(clips, 7, sounds_per_pair)
     orders = []
     for epoch in (0, 1, 1):
         sampler.set_epoch(epoch)
@@ -120,7 +122,7 @@ def test_validation_clips_are_the_same_for_every_train_seed() -> None:
 def test_empty_split_is_named() -> None:
     for split, scenes in (("train", ([], [1])), ("validation", ([1], []))):
         with pytest.raises(UserError, match=f"split.{split} has no apartment"):
-            SoundData(*scenes, synthetic_sounds(), MicrophoneConfig(), None)
+            SoundData(*scenes, synthetic_sounds(), Microphone(), None)
 
 
 @pytest.mark.parametrize("key", ["sounds_per_pair", "validation_clips"])
@@ -130,6 +132,6 @@ def test_number_that_cannot_work_is_named(key: str) -> None:
             [synthetic_scene()],
             [synthetic_scene()],
             synthetic_sounds(),
-            MicrophoneConfig(),
-            SoundModelConfig(name="test", **{key: 0}),
+            Microphone(),
+            option("sound_model", "cnn5", **{key: 0}),
         )

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 import torch
+from small import option
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
 from avn.apartments.grid import goal_cells
 from avn.core.errors import UserError
-from avn.datamodules.stop import GoalOften, StopData, moves_to_goal
-from avn.modules.stop_classifier import StopModelConfig
+from avn.datamodules.stop import GoalBalancedSampler, StopData, moves_to_goal
 
 
 def goal(scene) -> np.ndarray:
@@ -15,9 +15,9 @@ def goal(scene) -> np.ndarray:
 
 
 def data(goal=goal, **changes) -> StopData:
-    recipe = StopModelConfig(name="test", **{"batch": 16, "validation_clips": 50, **changes})
+    recipe = option("stop_model", "cnn5", **{"batch": 16, "validation_clips": 50, **changes})
     scenes = [synthetic_scene("a", 4.0)], [synthetic_scene("b", 4.5)]
-    return StopData(*scenes, synthetic_sounds(), MicrophoneConfig(), recipe, goal)
+    return StopData(*scenes, synthetic_sounds(), Microphone(), recipe, goal)
 
 
 def test_moves_are_those_of_the_shortest_walk_to_the_goal() -> None:
@@ -36,7 +36,7 @@ def test_an_epoch_shows_the_goal_as_often_as_it_should() -> None:
     module = data(positives=0.4)
     clips = module.train_clips
     sampler = module.train_sampler()
-    assert isinstance(sampler, GoalOften)
+    assert isinstance(sampler, GoalBalancedSampler)
     orders = []
     for epoch in (0, 1, 1):
         sampler.set_epoch(epoch)
@@ -52,8 +52,8 @@ def test_an_epoch_shows_the_goal_as_often_as_it_should() -> None:
         assert int(torch.bincount(pair[~at_goal]).max()) == 1
         orders.append(items)
     assert torch.equal(orders[1], orders[2])
-    takes = [order // len(clips) for order in orders]
-    assert int(takes[0].max()) < int(takes[1].min())
+    realisations = [order // len(clips) for order in orders]
+    assert int(realisations[0].max()) < int(realisations[1].min())
 
 
 def test_the_prior_is_the_share_of_states_at_the_goal() -> None:

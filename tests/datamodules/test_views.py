@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 import torch
+from small import option
 from synthetic_views import synthetic_views
 
 from avn.core.errors import UserError
-from avn.datamodules.views import COARSE, FreshViews, ViewData, ViewSet
-from avn.modules.occupancy_cnn import OccupancyConfig
+from avn.datamodules.views import COARSE, ViewData, ViewSampler, ViewSet
 from avn.modules.view_augment import AugmentConfig
 
 SAME = AugmentConfig(colour=0, light=0, noise=0, blur=0, erase=0, shift=0)
@@ -47,8 +47,8 @@ def test_training_shows_all_looks_and_measuring_the_first() -> None:
     apartment = synthetic_views(20, 0, looks=3)
     views = ViewSet([apartment], augmented=SAME)
     seen = set()
-    for take in range(5):
-        batch = views.__getitems__([20 * take + state for state in range(20)])
+    for realisation in range(5):
+        batch = views.__getitems__([20 * realisation + state for state in range(20)])
         for state, picture in enumerate((batch["pictures"] * 255).round().byte()):
             matches = [
                 look
@@ -78,7 +78,7 @@ def test_a_batch_is_a_function_of_its_items_and_the_seed() -> None:
 
 
 def test_an_epoch_shows_every_view_as_often_as_it_should() -> None:
-    sampler = FreshViews(20, 7, 3)
+    sampler = ViewSampler(20, 7, 3)
     orders = []
     for epoch in (0, 1, 1):
         sampler.set_epoch(epoch)
@@ -92,7 +92,7 @@ def test_an_epoch_shows_every_view_as_often_as_it_should() -> None:
 
 
 def test_the_prior_is_the_mean_window() -> None:
-    recipe = OccupancyConfig(name="test")
+    recipe = option("occupancy_model", "small")
     apartments = [synthetic_views(10, 0), synthetic_views(30, 1)]
     data = ViewData(apartments, [synthetic_views(5, 2)], recipe)
     windows = np.concatenate([apartment.free for apartment in apartments])
@@ -103,4 +103,4 @@ def test_empty_split_is_named() -> None:
     apartment = synthetic_views(5, 0)
     for split, given in (("train", ([], [apartment])), ("validation", ([apartment], []))):
         with pytest.raises(UserError, match=f"split.{split} has no apartment"):
-            ViewData(*given, OccupancyConfig(name="test"))
+            ViewData(*given, option("occupancy_model", "small"))

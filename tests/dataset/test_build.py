@@ -15,7 +15,7 @@ from avn.dataset import build
 from avn.dataset.scene import Brirs
 
 FEW = AcousticsConfig(rays=200, seconds=0.1)
-ROUND = AcousticsConfig(name="diffraction", first_arrival="round_corners", rays=200, seconds=0.1)
+ROUND = AcousticsConfig(name="diffraction", direct_path="diffraction", rays=200, seconds=0.1)
 
 
 @pytest.fixture(scope="module")
@@ -76,10 +76,10 @@ def test_a_killed_run_goes_on_where_it_was(plan, made, tmp_path, monkeypatch):
 def test_what_is_gathered_is_what_was_rendered(plan, made):
     scene = made[1]
     brirs, grid, config = scene.brirs, scene.grid, ROUND
-    ears = np.column_stack([grid.centres, np.full(grid.cells, config.ear_height)])
+    ears = np.column_stack([grid.centres, np.full(grid.cells, config.receiver_height)])
     source = np.array([*grid.centres[scene.sources[1]], config.source_height])
     tail = brir.render_source(build_surfaces(plan), source, ears, config)
-    first = brir.render_first_arrivals(walls(plan), source, ears, config)
+    first = brir.render_direct_paths(walls(plan), source, ears, config)
     whole = brir.combine(tail, first)
     cells = torch.tensor([0, 5, grid.cells - 1])
     for heading in range(4):

@@ -17,7 +17,7 @@ def path(tmp_path):
     return tmp_path / "features-lite.h5"
 
 
-def refusal(call) -> str:
+def missing_error(call) -> str:
     with pytest.raises(UserError) as caught:
         call()
     assert "\n" not in str(caught.value)
@@ -31,9 +31,9 @@ def test_read_back(path) -> None:
 
 def test_refused(path) -> None:
     other = path.with_name("features-resnet18.h5")
-    assert "no such scene file" in refusal(lambda: read_features(other, 8))
-    assert str(path) in refusal(lambda: read_features(path, 8, "other"))
-    assert "(8, 5)" in refusal(lambda: read_features(path, 12, "abc"))
+    assert "no such scene file" in missing_error(lambda: read_features(other, 8))
+    assert str(path) in missing_error(lambda: read_features(path, 8, "other"))
+    assert "(8, 5)" in missing_error(lambda: read_features(path, 12, "abc"))
 
 
 def test_equal_features_equal_bytes(path, tmp_path) -> None:

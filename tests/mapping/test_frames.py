@@ -1,13 +1,13 @@
 import torch
 
 from avn.core.pose import turned
-from avn.mapping.frames import FrameVotes, turned_walls
+from avn.mapping.frames import FrameAligner, turned_walls
 
 
 def test_an_equal_picture_tells_where_the_walk_lies() -> None:
     torch.manual_seed(0)
     turn, shift = torch.arange(4), torch.tensor([[3, -2], [0, 5], [-7, 1], [4, 4]])
-    votes = FrameVotes(4, 41, 0.02)
+    votes = FrameAligner(4, 41, 0.02)
     pose = torch.tensor([[1, 2, 3]] * 4)
     place = turned(pose[:, :2], turn) + shift
     true = torch.cat((place, ((pose[:, 2] + turn) % 4)[:, None]), dim=1)
@@ -22,7 +22,7 @@ def test_an_equal_picture_tells_where_the_walk_lies() -> None:
 
 
 def test_pictures_that_are_little_alike_decide_nothing_and_count_once() -> None:
-    votes = FrameVotes(1, 41, 0.02)
+    votes = FrameAligner(1, 41, 0.02)
     pose, places = torch.tensor([[0, 0, 0]]), torch.tensor([[[3, 3, 0]]])
     for _ in range(1000):
         votes.vote(pose, torch.tensor([[0.9]]), places, 0.5)
@@ -30,11 +30,11 @@ def test_pictures_that_are_little_alike_decide_nothing_and_count_once() -> None:
 
 
 def test_a_refused_winner_never_returns_and_a_settled_one_always_wins() -> None:
-    votes = FrameVotes(2, 41, 0.02)
+    votes = FrameAligner(2, 41, 0.02)
     pose = torch.zeros(2, 3, dtype=torch.int64)
     places = torch.tensor([[[3, 3, 0]]] * 2)
     votes.vote(pose, torch.ones(2, 1), places, 0.5)
-    assert votes.refuse(torch.tensor([True, False])).tolist() == [True, False]
+    assert votes.reject(torch.tensor([True, False])).tolist() == [True, False]
     for step in range(3):
         walked, seen = pose.clone(), places.clone()
         walked[:, 0], seen[:, 0, 0] = step, 3 + step

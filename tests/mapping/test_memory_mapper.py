@@ -18,7 +18,7 @@ def walk_of(poses) -> TensorDict:
     """One walk whose pictures are all different."""
     count = len(poses)
     observed = {
-        "feature": torch.eye(count)[None],
+        "visual_embedding": torch.eye(count)[None],
         "odometry": torch.tensor(poses)[None],
         "collided": torch.zeros(1, count, dtype=torch.bool),
     }
@@ -35,7 +35,7 @@ def begun(**settings) -> MemoryMapper:
 
 def look(mapper: MemoryMapper, feature: torch.Tensor, odometry=(0, 0, 0)) -> None:
     observation = {
-        "feature": feature[None],
+        "visual_embedding": feature[None],
         "odometry": torch.tensor([odometry]),
         "collided": torch.zeros(1, dtype=torch.bool),
     }
@@ -69,7 +69,7 @@ def test_edges_are_where_the_walk_went_or_between_all_neighbours(edges, joined):
 
 
 @pytest.mark.parametrize(
-    ("settings", "laid"),
+    ("settings", "overlaid"),
     [
         # a picture less alike by 0.02 has exp(-1) = 0.37 votes
         ({"sharpness": 0.02, "confidence": 0.5}, False),
@@ -78,18 +78,18 @@ def test_edges_are_where_the_walk_went_or_between_all_neighbours(edges, joined):
         ({"sharpness": 0.05, "confidence": 0.7}, False),
     ],
 )
-def test_the_walk_is_laid_over_the_map_from_enough_votes_on(settings, laid):
+def test_the_walk_is_laid_over_the_map_from_enough_votes_on(settings, overlaid):
     mapper = begun(top=1, **settings)
     alike = torch.zeros(len(ROUND) + 1)
     alike[3], alike[-1] = 0.98, (1 - 0.98**2) ** 0.5
     # one picture more than the walk has, so that the cosine with the fourth is 0.98
     memory = torch.nn.functional.pad(torch.eye(len(ROUND)), (0, 1))[None]
     walks = walk_of(ROUND)
-    walks["feature"] = memory
+    walks["visual_embedding"] = memory
     mapper.reset(1, GraphRules())
     mapper.explore(walks, torch.zeros(1, dtype=torch.int64))
     look(mapper, alike)
-    assert (len(believed(mapper)) > 1) == laid
+    assert (len(believed(mapper)) > 1) == overlaid
 
 
 def test_the_walk_lies_where_the_picture_says_turned_as_the_agent_is():

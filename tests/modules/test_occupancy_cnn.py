@@ -3,22 +3,25 @@ from typing import Any
 
 import pytest
 import torch
-from hydra.utils import instantiate
 from lightning.pytorch.callbacks import Callback
-from omegaconf import OmegaConf
+from omegaconf import DictConfig, OmegaConf
+from small import option
 from synthetic_views import synthetic_views
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from avn.core.classes import build_object
 from avn.core.errors import UserError
+from avn.core.settings import typed
 from avn.datamodules.views import ViewData
-from avn.modules.occupancy_cnn import OccupancyCnn, OccupancyConfig
+from avn.modules.occupancy_cnn import OccupancyCnn
 from avn.modules.training import BEST, LAST, fit, load_weights
 from avn.modules.view_augment import AugmentConfig
 from avn.reporting.window_figures import WindowFigures
 
 
-def recipe(**changes: Any) -> OccupancyConfig:
-    config = OccupancyConfig(name="test", epochs=6, batch=16, looks=2, times=4, validation_views=50)
+def recipe(**changes: Any) -> DictConfig:
+    given = {"epochs": 6, "batch": 16, "appearances": 2, "times": 4, "validation_views": 50}
+    config = option("occupancy_model", "small", **given)
     config.net.widths, config.net.decoder, config.net.cell = [8, 8, 8, 8], 8, 16
     config.net.dropout, config.optimizer.lr = 0.0, 1e-2
     config.augment = AugmentConfig(colour=0.2, light=0.2, noise=0.02, blur=0, erase=0, shift=0)
@@ -29,8 +32,8 @@ def recipe(**changes: Any) -> OccupancyConfig:
 
 def build(**changes: Any) -> tuple[ViewData, OccupancyCnn]:
     config = recipe(**changes)
-    data = ViewData([synthetic_views(120, 0, looks=2)], [synthetic_views(60, 1)], config)
-    return data, instantiate(OmegaConf.structured(config))
+    data = ViewData([synthetic_views(120, 0, looks=2)], [synthetic_views(60, 1)], typed(config))
+    return data, build_object("occupancy_model", config)
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +118,7 @@ def test_checkpoint_of_another_config_is_one_line(
     other = recipe()
     other.net.cell = 8
     with pytest.raises(UserError, match=message):
-        load_weights(instantiate(OmegaConf.structured(other)), run[0] / BEST)
+        load_weights(build_object("occupancy_model", other), run[0] / BEST)
 
 
 def test_hidden_cells_teach_nothing_with_visible_only() -> None:
@@ -129,17 +132,13 @@ def test_hidden_cells_teach_nothing_with_visible_only() -> None:
 
 
 def test_every_recipe_key_reaches_the_model() -> None:
-    machinery = {"_target_", "_recursive_", "_convert_"}
-    node = OmegaConf.structured(recipe())
-    assert set(instantiate(node).hparams) - {"camera"} == set(node) - machinery
+    node = recipe()
+    model = build_object("occupancy_model", node)
+    assert set(model.hparams) - {"camera"} == set(node) - {"_target_"}
 
 
 def test_released_sizes() -> None:
-    conf = Path(__file__).parents[2] / "conf" / "occupancy_model" / "released.yaml"
-    node = OmegaConf.load(conf)
-    del node["defaults"]
-    node.train_seed = 0
-    model = instantiate(OmegaConf.merge(OmegaConf.structured(recipe()), node))
+    model = build_object("occupancy_model", option("occupancy_model", "released"))
     convolutions = [layer for layer in model.net.modules() if isinstance(layer, torch.nn.Conv2d)]
     sizes = [(layer.out_channels, layer.kernel_size[0]) for layer in convolutions]
     assert sizes == [(32, 7), (48, 7), (64, 5), (64, 5)]
@@ -160,7 +159,7 @@ def test_released_sizes() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"looks": 0}, r"occupancy_model\.looks is 0"),
+        ({"appearances": 0}, r"occupancy_model\.appearances is 0"),
         ({"depth_weight": -1.0}, r"occupancy_model\.depth_weight is -1"),
         ({"schedule": "linear"}, r"occupancy_model\.schedule is 'linear'"),
     ],

@@ -3,15 +3,17 @@ from typing import Any
 
 import pytest
 import torch
-from hydra.utils import instantiate
-from omegaconf import OmegaConf
+from omegaconf import DictConfig
+from small import option
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
 from avn.apartments.grid import goal_cells
+from avn.core.classes import build_object
 from avn.core.errors import UserError
+from avn.core.settings import typed
 from avn.datamodules.stop import StopData
-from avn.modules.stop_classifier import StopClassifier, StopModelConfig
+from avn.modules.stop_classifier import StopClassifier
 from avn.modules.training import BEST, fit, load_weights
 from avn.pipeline.audio_inference import hear
 from avn.reporting.stop_figures import StopFigures
@@ -19,8 +21,8 @@ from avn.reporting.stop_figures import StopFigures
 CONF = Path(__file__).parents[2] / "conf" / "stop_model"
 
 
-def recipe(**changes: Any) -> StopModelConfig:
-    config = StopModelConfig(name="test", epochs=5, batch=16, validation_clips=400)
+def recipe(**changes: Any) -> DictConfig:
+    config = option("stop_model", "cnn5", epochs=5, batch=16, validation_clips=400)
     config.optimizer.lr, config.net.dropout = 3e-3, 0.1
     config.spectrogram.bands = config.spectrogram.frames = 16
     config.net.widths, config.net.hidden = [8, 8, 8, 8, 8], [16]
@@ -35,11 +37,11 @@ def build(**changes: Any) -> tuple[StopData, StopClassifier]:
     data = StopData(
         *scenes,
         synthetic_sounds(),
-        MicrophoneConfig(),
-        config,
+        Microphone(),
+        typed(config),
         lambda scene: goal_cells(scene.grid)[scene.sources],
     )
-    return data, instantiate(OmegaConf.structured(config))
+    return data, build_object("stop_model", config)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +104,7 @@ def test_every_state_gets_a_probability(
     run: tuple[Path, StopClassifier, dict[str, Any]],
 ) -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    given = (scene, sounds, run[1], 2, MicrophoneConfig(), 5, False)
+    given = (scene, sounds, run[1], 2, Microphone(), 5, False)
     scores = hear(*given)
     assert scores.shape == (2, 4 * scene.grid.cells, 2, 2)
     assert scores.dtype == torch.float32
@@ -111,13 +113,7 @@ def test_every_state_gets_a_probability(
 
 def test_option_names_are_those_of_the_files() -> None:
     for path in CONF.glob("*.yaml"):
-        assert OmegaConf.load(path)["name"] == path.stem
-    none = OmegaConf.merge(
-        OmegaConf.structured(StopModelConfig),
-        {"_target_": OmegaConf.load(CONF / "none.yaml")["_target_"]},
-    )
-    none.name = "none"
-    assert instantiate(none) is None
+        assert option("stop_model", path.stem).name == path.stem
 
 
 @pytest.mark.parametrize(
@@ -130,7 +126,5 @@ def test_option_names_are_those_of_the_files() -> None:
     ],
 )
 def test_bad_option_is_named(changes: dict[str, Any], message: str) -> None:
-    plain = OmegaConf.to_container(OmegaConf.structured(recipe(**changes)))
-    assert isinstance(plain, dict)
     with pytest.raises(UserError, match=message):
-        StopClassifier(**{str(k): v for k, v in plain.items() if not str(k).startswith("_")})
+        build_object("stop_model", recipe(**changes))

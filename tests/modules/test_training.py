@@ -3,22 +3,24 @@ from typing import Any
 
 import pytest
 import torch
-from hydra.utils import instantiate
 from lightning.pytorch.callbacks import Callback
-from omegaconf import OmegaConf
+from omegaconf import DictConfig
+from small import option
 from synthetic_scene import synthetic_scene, synthetic_sounds
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
+from avn.core.classes import build_object
 from avn.core.errors import UserError
+from avn.core.settings import typed
 from avn.datamodules.sound import SoundData
-from avn.modules.sound_cnn import SoundCnn, SoundModelConfig
+from avn.modules.sound_cnn import SoundCnn
 from avn.modules.training import BEST, LAST, fit, load_weights
 from avn.reporting.sound_figures import SoundFigures
 
 
-def recipe(**changes: Any) -> SoundModelConfig:
-    config = SoundModelConfig(name="test", epochs=4, batch=16, validation_clips=60)
+def recipe(**changes: Any) -> DictConfig:
+    config = option("sound_model", "cnn5", epochs=4, batch=16, validation_clips=60)
     config.optimizer.lr, config.net.dropout = 3e-3, 0.1
     config.spectrogram.bands = config.spectrogram.frames = 16
     config.net.widths, config.net.hidden = [8, 8, 8, 8, 8], [16]
@@ -30,8 +32,8 @@ def recipe(**changes: Any) -> SoundModelConfig:
 def build(**changes: Any) -> tuple[SoundData, SoundCnn]:
     config = recipe(**changes)
     scenes = [synthetic_scene("a")], [synthetic_scene("b", 2.5)]
-    data = SoundData(*scenes, synthetic_sounds(), MicrophoneConfig(), config)
-    return data, instantiate(OmegaConf.structured(config))
+    data = SoundData(*scenes, synthetic_sounds(), Microphone(), typed(config))
+    return data, build_object("sound_model", config)
 
 
 @pytest.fixture(scope="module")

@@ -8,16 +8,20 @@ from small import opened
 from avn.acoustics.brir import AcousticsConfig
 from avn.agents.oracle import Oracle
 from avn.agents.random_walk import RandomWalk
-from avn.agents.rollout import Labels, walk_room
+from avn.agents.rollout import Labels, rollout_scene
 from avn.apartments.splits import SplitConfig, load_split
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
 from avn.navigation.protocols import Protocol
 from avn.reporting.results import headline, summarise
 
 PROTOCOLS = {
-    "var": Protocol("var", goal="box", says_stop=False, path="attempted", moves_factor=2.0),
-    "var_stop": Protocol("var_stop", goal="box", says_stop=True, path="attempted", moves_factor=2),
-    "stop": Protocol("stop", goal="radius", says_stop=True, path="walked"),
+    "var": Protocol(
+        "var", goal="box", requires_stop=False, path_length="moves", max_moves_ratio=2.0
+    ),
+    "var_stop": Protocol(
+        "var_stop", goal="box", requires_stop=True, path_length="moves", max_moves_ratio=2
+    ),
+    "stop": Protocol("stop", goal="radius", requires_stop=True, path_length="metres"),
 }
 
 
@@ -31,7 +35,7 @@ def rooms(tmp_path_factory):
 def walked(agent, rooms, protocol, episodes):
     labels = Labels(agent="agent", acoustics="resonance")
     records = [
-        walk_room(agent, room, episodes(room, ["ring"], protocol, 0), protocol, labels)
+        rollout_scene(agent, room, episodes(room, ["ring"], protocol, 0), protocol, labels)
         for room in rooms
     ]
     return headline(summarise(pd.concat(records, ignore_index=True), draws=10))

@@ -15,7 +15,7 @@ FROZEN = [180, 188, 17, 80, 187, 102, 71, 201, 202, 195, 29, 14]
 
 def test_frozen_list_stays_frozen(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
     # These very numbers are what published figures rest on: a change here changes every result.
-    rules = dataclasses.replace(protocols["var"], starts=6)
+    rules = dataclasses.replace(protocols["var"], num_starts=6)
     episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
     assert episodes.start.tolist() == FROZEN
 
@@ -57,7 +57,7 @@ def test_starts_lie_outside_the_goal_and_differ(
 
 def test_starts_lie_outside_the_one_walk_of_a_room(protocols: dict[str, Protocol]) -> None:
     hall = draw("hall", HALL)
-    rules = dataclasses.replace(protocols["var"], exploration=400)
+    rules = dataclasses.replace(protocols["var"], exploration_steps=400)
     episodes = frozen_episodes(hall, SOUNDS, rules, seed=0)
     assert episodes.walks.shape == (1, 401)
     assert (episodes.walk == 0).all()
@@ -68,7 +68,7 @@ def test_starts_lie_outside_the_one_walk_of_a_room(protocols: dict[str, Protocol
 
 def test_own_walks_differ_and_leave_their_start_unexplored(protocols: dict[str, Protocol]) -> None:
     hall = draw("hall", HALL)
-    rules = dataclasses.replace(protocols["var"], exploration=400)
+    rules = dataclasses.replace(protocols["var"], exploration_steps=400)
     episodes = frozen_episodes(hall, SOUNDS, rules, seed=0, exploration="own")
     assert episodes.walks.shape == (40, 401)
     assert len(np.unique(episodes.walks, axis=0)) == 40
@@ -84,7 +84,7 @@ def test_a_walk_that_leaves_too_few_starts_is_cut(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol], exploration: str
 ) -> None:
     # No walk of 5,000 steps leaves a cell of 51; it is cut where enough cells are left.
-    rules = dataclasses.replace(protocols["var"], exploration=5000)
+    rules = dataclasses.replace(protocols["var"], exploration_steps=5000)
     episodes = frozen_episodes(two_rooms, ["ring"], rules, 0, exploration)
     goal = rules.goal_cells(two_rooms.grid, two_rooms.sources)
     least = 5 if exploration == "shared" else 1
@@ -114,7 +114,7 @@ def test_exhaustive_takes_every_start(
 
 
 def test_too_few_starts_name_the_room(protocols: dict[str, Protocol]) -> None:
-    with pytest.raises(UserError, match=r"protocol.starts: room 'hut' has only 16 starts"):
+    with pytest.raises(UserError, match=r"protocol.num_starts: room 'hut' has only 16 starts"):
         frozen_episodes(draw("hut", "Aaaaaa"), ["ring"], protocols["var"], seed=0)
 
 

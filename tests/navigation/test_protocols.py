@@ -47,21 +47,21 @@ def test_stop_is_an_action_only_where_the_protocol_has_it(protocols: dict[str, P
     ("key", "value"),
     [
         ("goal", "bow"),
-        ("path", "metres"),
+        ("path_length", "walked"),
         ("radius", -1.0),
-        ("moves_factor", 0.5),
+        ("max_moves_ratio", 0.5),
         ("max_actions", 0),
-        ("starts", 0),
-        ("exploration", -1),
+        ("num_starts", 0),
+        ("exploration_steps", -1),
     ],
 )
 def test_wrong_rules_name_their_key(key: str, value: Any) -> None:
-    rules = {"name": "x", "goal": "box", "says_stop": False, "path": "attempted", key: value}
+    rules = {"name": "x", "goal": "box", "requires_stop": False, "path_length": "moves", key: value}
     with pytest.raises(UserError, match=f"protocol.{key}"):
         Protocol(**rules)
 
 
 def test_radius_keeps_cells_that_lie_on_it() -> None:
     place = draw("corridor", "A" + 10 * "a")
-    rules = Protocol("wide", "radius", True, "walked", radius=1.5)
+    rules = Protocol("wide", "radius", True, "metres", radius=1.5)
     assert np.flatnonzero(rules.goal_cells(place.grid, place.sources)[0]).tolist() == [0, 1, 2, 3]

@@ -168,16 +168,16 @@ def test_observations_hold_nothing_else(
         two_rooms,
         episodes,
         protocols["var"],
-        SceneObservations({"sound": torch.zeros(2, 204, 1, 4, 2)}),
+        SceneObservations({"source_estimate": torch.zeros(2, 204, 1, 4, 2)}),
     )
-    assert set(hearing.reset().keys()) == {"collided", "odometry", "sound"}
+    assert set(hearing.reset().keys()) == {"collided", "odometry", "source_estimate"}
     seeing = Simulator(
         two_rooms,
         episodes,
         protocols["var"],
-        SceneObservations(visual={"window": torch.zeros(204, 5, 5)}),
+        SceneObservations(visual={"local_patch": torch.zeros(204, 5, 5)}),
     )
-    assert set(seeing.reset().keys()) == {"collided", "odometry", "window"}
+    assert set(seeing.reset().keys()) == {"collided", "odometry", "local_patch"}
 
 
 def test_sights_are_those_of_the_state(
@@ -186,46 +186,51 @@ def test_sights_are_those_of_the_state(
     episodes = exhaustive_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
     numbers = torch.arange(204)[:, None]
     simulator = Simulator(
-        two_rooms, episodes, protocols["var"], SceneObservations(visual={"feature": numbers})
+        two_rooms,
+        episodes,
+        protocols["var"],
+        SceneObservations(visual={"visual_embedding": numbers}),
     )
-    assert (simulator.reset()["feature"][:, 0] == simulator.state).all()
+    assert (simulator.reset()["visual_embedding"][:, 0] == simulator.state).all()
     after = simulator.step(torch.full((len(episodes),), FORWARD))
-    assert (after["feature"][:, 0] == simulator.state).all()
-    with pytest.raises(ValueError, match="'feature' has 203 rows for 204 states"):
+    assert (after["visual_embedding"][:, 0] == simulator.state).all()
+    with pytest.raises(ValueError, match="'visual_embedding' has 203 rows for 204 states"):
         Simulator(
             two_rooms,
             episodes,
             protocols["var"],
-            SceneObservations(visual={"feature": numbers[1:]}),
+            SceneObservations(visual={"visual_embedding": numbers[1:]}),
         )
 
 
 def test_walks_are_seen_from_their_own_start(
     two_rooms: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
-    rules = dataclasses.replace(protocols["var"], exploration=30, starts=4)
+    rules = dataclasses.replace(protocols["var"], exploration_steps=30, num_starts=4)
     episodes = frozen_episodes(two_rooms, ["ring"], rules, 0, "own")
     numbers = torch.arange(204)[:, None]
     simulator = Simulator(
-        two_rooms, episodes, rules, SceneObservations(visual={"feature": numbers})
+        two_rooms, episodes, rules, SceneObservations(visual={"visual_embedding": numbers})
     )
     walks, walk = simulator.explored()
     assert walks.batch_size == (8, 31)
     assert walk.tolist() == list(range(8))
     assert (walks["odometry"][:, 0] == 0).all()
-    assert (walks["feature"][..., 0].numpy() == episodes.walks).all()
+    assert (walks["visual_embedding"][..., 0].numpy() == episodes.walks).all()
     moved = walks["odometry"][:, 1:, :2] - walks["odometry"][:, :-1, :2]
     cells = episodes.walks // 4
     assert ((moved.abs().sum(-1) == 1).numpy() == (cells[:, 1:] != cells[:, :-1])).all()
     turned = (walks["odometry"][..., 2].numpy() + episodes.walks[:, :1]) % 4
     assert (turned == episodes.walks % 4).all()
-    assert "sound" not in set(walks.keys())
+    assert "source_estimate" not in set(walks.keys())
 
 
 def numbered(sounds: int, realisations: int) -> SceneObservations:
     """Hearing whose features are the very indices, for two sources and 204 states."""
     axes = (torch.arange(size) for size in (2, 204, sounds, realisations))
-    return SceneObservations({"sound": torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1)})
+    return SceneObservations(
+        {"source_estimate": torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1)}
+    )
 
 
 def test_hearing_is_of_the_source_the_state_and_the_sound(
@@ -234,14 +239,14 @@ def test_hearing_is_of_the_source_the_state_and_the_sound(
     episodes = exhaustive_episodes(two_rooms, ["ring", "alarm"], protocols["var"], seed=0)
     simulator = Simulator(two_rooms, episodes, protocols["var"], numbered(2, 4))
     actions = torch.randint(4, (30, len(episodes)), generator=torch.Generator().manual_seed(0))
-    takes = []
+    realisations = []
     for action in actions:
-        sound = simulator.step(action)["sound"]
+        sound = simulator.step(action)["source_estimate"]
         assert (sound[:, 0] == simulator.source).all()
         assert (sound[:, 1] == simulator.state).all()
         assert (sound[:, 2] == simulator.sound).all()
-        takes.append(sound[:, 3][~simulator.done])
-    shares = torch.bincount(torch.cat(takes)) / len(torch.cat(takes))
+        realisations.append(sound[:, 3][~simulator.done])
+    shares = torch.bincount(torch.cat(realisations)) / len(torch.cat(realisations))
     assert torch.allclose(shares, torch.full((4,), 0.25), atol=0.02)
 
 
@@ -254,12 +259,15 @@ def test_takes_do_not_depend_on_who_else_is_in_the_batch(
     hearing = numbered(1, 4)
     whole = Simulator(two_rooms, every, rules, hearing)
     part = Simulator(two_rooms, pick(every, some.numpy()), rules, hearing)
-    assert (whole.reset()["sound"][some] == part.reset()["sound"]).all()
+    assert (whole.reset()["source_estimate"][some] == part.reset()["source_estimate"]).all()
     different = torch.zeros(len(some), dtype=torch.bool)
     for _ in range(5):
-        before = whole.observe()["sound"][some]
+        before = whole.observe()["source_estimate"][some]
         action = torch.full((len(every),), LEFT)
-        heard, own = whole.step(action)["sound"][some], part.step(action[some])["sound"]
+        heard, own = (
+            whole.step(action)["source_estimate"][some],
+            part.step(action[some])["source_estimate"],
+        )
         assert (heard == own).all()
         different |= heard[:, 3] != before[:, 3]
     assert different.float().mean() > 0.9
@@ -294,5 +302,5 @@ def test_hearing_of_another_apartment_is_refused(
     corridor: DrawnPlace, protocols: dict[str, Protocol]
 ) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
-    with pytest.raises(ValueError, match="audio 'sound' has shape"):
+    with pytest.raises(ValueError, match="audio 'source_estimate' has shape"):
         Simulator(corridor, episodes, protocols["var"], numbered(1, 1))

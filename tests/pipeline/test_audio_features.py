@@ -16,7 +16,7 @@ SMALL = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
-    "takes=1",
+    "realisations=1",
     "sound=alarm",
 )
 
@@ -39,7 +39,7 @@ def test_the_last_two_numbers_are_what_the_network_says_and_are_kept(outputs):
 def test_training_and_evaluation_never_hear_the_same_take(outputs):
     cfg = composed(*SMALL, f"outputs={outputs}")
     one, other = (
-        AudioEmbeddings(cfg, Apartments(cfg, "test"), Clips("takes", purpose))
+        AudioEmbeddings(cfg, Apartments(cfg, "test"), Clips("realisations", purpose))
         for purpose in ("eval", "train")
     )
     for stage in (one, other):

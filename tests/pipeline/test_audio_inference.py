@@ -1,28 +1,28 @@
 import numpy as np
 import pytest
 import torch
-from hydra.utils import instantiate
-from omegaconf import OmegaConf
+from small import option
 from synthetic_scene import synthetic_scene, synthetic_sounds
 
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
+from avn.core.classes import build_object
 from avn.datamodules.sound import ClipSet
-from avn.modules.sound_cnn import SoundCnn, SoundModelConfig
+from avn.modules.sound_cnn import SoundCnn
 from avn.pipeline.audio_inference import hear, sound_errors
 
 
 @pytest.fixture(scope="module")
 def model() -> SoundCnn:
-    config = SoundModelConfig(name="test")
+    config = option("sound_model", "cnn5")
     config.spectrogram.bands = config.spectrogram.frames = 32
     config.net.widths = [4, 4, 8, 8, 8]
-    return instantiate(OmegaConf.structured(config)).eval()
+    return build_object("sound_model", config).eval()
 
 
 @pytest.fixture(scope="module")
 def heard(model: SoundCnn) -> torch.Tensor:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    return hear(scene, sounds, model, 2, MicrophoneConfig(), seed=5, progress=False)
+    return hear(scene, sounds, model, 2, Microphone(), seed=5, progress=False)
 
 
 def test_every_clip_is_heard(model: SoundCnn, heard: torch.Tensor) -> None:
@@ -30,22 +30,22 @@ def test_every_clip_is_heard(model: SoundCnn, heard: torch.Tensor) -> None:
     assert heard.shape == (2, 4 * scene.grid.cells, 2, 2, 2)
     assert heard.dtype == torch.float32
     # The clips are those that the data module renders for the same take.
-    clips = ClipSet([scene], sounds, MicrophoneConfig(), "eval", 5)
+    clips = ClipSet([scene], sounds, Microphone(), "eval", 5)
     pairs = torch.tensor([0, 7, clips.pairs - 1])
     for sound in range(2):
-        for take in range(2):
-            batch = clips.__getitems__(clips.item(pairs, torch.tensor(sound), take).tolist())
+        for realisation in range(2):
+            batch = clips.__getitems__(clips.item(pairs, torch.tensor(sound), realisation).tolist())
             with torch.inference_mode():
                 expected = model(batch["clips"])
-            found = heard.flatten(0, 1)[pairs, sound, take]
+            found = heard.flatten(0, 1)[pairs, sound, realisation]
             torch.testing.assert_close(found, expected, atol=1e-4, rtol=1e-4)
 
 
 def test_takes_and_seeds_differ_and_repeat(model: SoundCnn, heard: torch.Tensor) -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
 
-    def again(takes: int, seed: int) -> torch.Tensor:
-        given = (scene, sounds, model, takes, MicrophoneConfig(), seed, False)
+    def again(realisations: int, seed: int) -> torch.Tensor:
+        given = (scene, sounds, model, realisations, Microphone(), seed, False)
         return hear(*given)
 
     assert torch.equal(again(2, 5), heard)

@@ -27,7 +27,7 @@ def test_films_of_what_is_asked_for_lie_in_the_run_and_change_nothing(command, o
     assert Path(out[-1]) == folder
     (film,) = (folder / "films").glob("*.mp4")
     room, sound, number, outcome = film.stem.split("-")
-    row = episodes.query(f"room == '{room}' and sound == '{sound}' and episode == {number}")
+    row = episodes.query(f"scene == '{room}' and sound == '{sound}' and episode == {number}")
     assert row["outcome"].item() == outcome
     _, seconds = imageio_ffmpeg.count_frames_and_secs(str(film))
     assert seconds == pytest.approx(row["actions"].item() + 1, abs=0.2)

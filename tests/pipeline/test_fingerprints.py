@@ -80,12 +80,12 @@ def moved(override):
         ("processes=1", NONE),
         ("auto=false", NONE),
         ("protocol.radius=3", NONE),  # of another goal
-        ("planner.error.near=3", NONE),  # of another filter
+        ("planner.error.sigma=3", NONE),  # of another filter
         ("stop_model.criterion=balanced", RUN),
         ("stop_model.threshold=0.7", RUN),
-        ("protocol.starts=5", RUN),
+        ("protocol.num_starts=5", RUN),
         ("mapper.top=2", RUN),
-        ("planner.patience=5", RUN),
+        ("planner.max_rotations=5", RUN),
         ("localisation=retrieval", RUN),
     ],
 )
@@ -99,21 +99,21 @@ def test_how_an_agent_acts_is_no_part_of_what_it_learnt(override, wanted):
         ("seed=5", RUN | {"run_windows"}),
         ("episodes=exhaustive", RUN | {"run_windows"}),
         ("sound=alarm", HEARD | {"run_windows"}),
-        ("takes=2", HEARD | {"run_windows", "policy", "policy_map"}),
+        ("realisations=2", HEARD | {"run_windows", "policy", "policy_map"}),
         ("sound_model.epochs=3", {*EARS, "run_windows", "policy_map"} - {"stops", "stop"}),
         ("stop_model.positives=0.5", {"stop", "stops", "run"}),
         ("protocol=stop", {"stop", "stops", "run"}),
         ("occupancy_model.epochs=3", {"occupancy", "patches"}),
-        ("occupancy_model.looks=3", {"occupancy", "patches"}),
+        ("occupancy_model.appearances=3", {"occupancy", "patches"}),
         ("renderer.camera.pitch=-20", SEEN),
         ("backbone.size=64", {"embeddings", "run", "policy", "policy_map"}),
-        ("a3c.gamma=0.9", {"policy", "policy_map"}),
-        ("a3c.walks=3", NONE),  # neither explores
+        ("algorithm.gamma=0.9", {"policy", "policy_map"}),
+        ("algorithm.exploration_walks=3", NONE),  # neither explores
         ("mapper.visible_above=0.2", {"run_windows", "policy_map"}),
         # the regimes share the reverberation
         ("acoustics=diffraction", {*DIRECT, "run_windows", "policy_map"}),
         ("acoustics.rays=500", {*SOUNDING, "run_windows", "policy_map"}),
-        ("acoustics.ear_height=1.4", {*SOUNDING, "geometry", "run_windows", "policy_map"}),
+        ("acoustics.receiver_height=1.4", {*SOUNDING, "geometry", "run_windows", "policy_map"}),
         ("split.seed=9", EVERY),
     ],
 )
@@ -174,8 +174,8 @@ def test_the_training_world_follows_the_test_world_until_it_is_chosen():
     assert cfg.training.microphone.gain == 1.0
     assert list(cfg.training.sounds) == ["ring", "alarm", "clock"]
     own = composed("acoustics=diffraction", "+acoustics@training.acoustics=resonance")
-    assert own.training.acoustics.first_arrival == "through_walls"
-    assert own.acoustics.first_arrival == "round_corners"
+    assert own.training.acoustics.direct_path == "transmission"
+    assert own.acoustics.direct_path == "diffraction"
 
 
 def test_equal_worlds_share_their_sound_and_other_parts_share_no_views():
@@ -189,13 +189,19 @@ def test_equal_worlds_share_their_sound_and_other_parts_share_no_views():
 @pytest.mark.parametrize(
     ("row", "override"),
     [
-        (("agent=oracle", "episodes=exhaustive"), "protocol.starts=7"),
-        (("agent=oracle", "episodes=exhaustive"), "protocol.exploration=33"),
+        (("agent=oracle", "episodes=exhaustive"), "protocol.num_starts=7"),
+        (("agent=oracle", "episodes=exhaustive"), "protocol.exploration_steps=33"),
         (("agent=greedy",), "baseline.slack=0.9"),
         (("agent=ours_exp", "localisation=retrieval"), "mapper.sharpness=0.5"),
         (("agent=ours_exp", "localisation=retrieval"), "mapper.confidence=0.9"),
-        (("agent=ours_noexp", "agent.truth=[location,window]"), "takes=2"),
-        (("agent=ours_noexp", "agent.truth=[location,window]"), "renderer.camera.size=64"),
+        (
+            ("agent=ours_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
+            "realisations=2",
+        ),
+        (
+            ("agent=ours_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
+            "renderer.camera.size=64",
+        ),
         (("agent=a3c_va",), "baseline.top=1"),
     ],
 )
@@ -208,13 +214,14 @@ def test_what_makes_no_difference_to_a_run_makes_none_anew(row, override):
 @pytest.mark.parametrize(
     ("row", "override"),
     [
-        (("agent=oracle",), "protocol.starts=7"),
+        (("agent=oracle",), "protocol.num_starts=7"),
         (("agent=greedy", "protocol=stop"), "baseline.slack=0.9"),
         (("agent=ours_exp",), "mapper.sharpness=0.5"),
-        (("agent=ours_exp", "planner.source=belief"), "planner.error.near=0.9"),
-        (("agent=ours_noexp", "agent.truth=[location,window]"), "renderer.camera.pitch=-20"),
+        (("agent=ours_exp", "planner.source_filter=bayes"), "planner.error.sigma=0.9"),
+        (("agent=ours_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
+         "renderer.camera.pitch=-20"),
         (("agent=ours_noexp",), "mapper.visible_above=0.3"),
-        (("agent=ours_exp", "mapper.windows=true", "occupancy_model=small"),
+        (("agent=ours_exp", "mapper.local_patches=true", "occupancy_model=small"),
          "mapper.visible_above=0.3"),
         (("agent=a3c_va",), "baseline.samples=false"),
     ],
@@ -227,7 +234,7 @@ def test_what_makes_a_difference_to_a_run_is_read(row, override):
 
 @pytest.mark.parametrize(
     "override",
-    ["protocol.starts=5", "protocol.name=mine", "part=validation", "baseline.samples=false"],
+    ["protocol.num_starts=5", "protocol.name=mine", "subset=validation", "baseline.samples=false"],
 )
 def test_evaluations_choose_no_policy(override):
     one, other = (
@@ -248,7 +255,7 @@ def test_two_rows_never_share_a_folder():
 @pytest.mark.parametrize("kind", [SoundNetwork, StopNetwork])
 def test_the_acoustics_of_the_training_world_are_read_where_they_follow_the_test(kind):
     read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini")).read()
-    assert {"acoustics.name", "acoustics.first_arrival", "acoustics.rays", "split.seed"} <= read
+    assert {"acoustics.name", "acoustics.direct_path", "acoustics.rays", "split.seed"} <= read
     own = "+acoustics@training.acoustics=resonance"
     read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini", own)).read()
     assert not any(key.startswith("acoustics.") for key in read)
@@ -258,17 +265,26 @@ def test_the_acoustics_of_the_training_world_are_read_where_they_follow_the_test
     ("overrides", "line"),
     [
         (("agent=a3c_va_m", "episodes=exhaustive"), "have no exploration walk"),
-        (("agent=ours_exp", "protocol.exploration=0"), "have no exploration walk"),
-        (("agent=ours_noexp", "agent.truth=[pose]", "agent.privileged=true"), "'pose' is nothing"),
-        (("agent=ours_exp", "agent.truth=[map]", "agent.privileged=true"), "'map' is nothing"),
-        (("agent=ours_exp", "agent.truth=[window]", "agent.privileged=true"), "'window' is noth"),
+        (("agent=ours_exp", "protocol.exploration_steps=0"), "have no exploration walk"),
+        (
+            ("agent=ours_noexp", "agent.oracle_inputs=[pose]", "agent.privileged=true"),
+            "'pose' is nothing",
+        ),
+        (
+            ("agent=ours_exp", "agent.oracle_inputs=[map]", "agent.privileged=true"),
+            "'map' is nothing",
+        ),
+        (
+            ("agent=ours_exp", "agent.oracle_inputs=[local_patch]", "agent.privileged=true"),
+            "'local_patch' is noth",
+        ),
         (("agent=ours_noexp", "mapper.size=100"), "mapper.size: 100; give an odd number"),
         (("agent=ours_noexp", "protocol=stop", "stop_model.criterion=foo"), "stop_model.criterion"),
         (("agent=a3c_va_mapper", "baseline.map_width=20"), "baseline.map_width: 20"),
         (("agent=greedy", "sound_model.epochs=0"), "epochs"),
         (("agent=ours_noexp", "sound_model.schedule=foo"), "schedule"),
-        (("agent=ours_noexp", "occupancy_model.looks=0"), "occupancy_model.looks: 0"),
-        (("agent=greedy", "takes=0"), "takes: 0 is out of range"),
+        (("agent=ours_noexp", "occupancy_model.appearances=0"), "occupancy_model.appearances: 0"),
+        (("agent=greedy", "realisations=0"), "realisations: 0 is out of range"),
     ],
 )
 def test_what_cannot_work_is_refused_before_anything_is_made(overrides, line, tmp_path):
@@ -329,4 +345,4 @@ def test_only_rows_that_say_so_are_shown_the_truth(row):
     cfg = composed(f"agent={row}", "split=mini")
     agent = build_agent(cfg)
     assert agent.privileged == cfg.agent.privileged == (row == "oracle")
-    assert "sound" not in agent.needs or hears(cfg)
+    assert "source_estimate" not in agent.needs or hears(cfg)

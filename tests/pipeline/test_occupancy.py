@@ -17,7 +17,7 @@ def test_errors_are_of_each_room_and_of_all():
     # A perfect estimate.
     estimates = [free.float() * 0.98 + 0.01 for free, _ in truths]
     prior = torch.full((5, 5), 0.7)
-    table = window_errors(rooms, camera, estimates, prior).set_index(["room", "by", "cells"])
+    table = window_errors(rooms, camera, estimates, prior).set_index(["scene", "by", "cells"])
     assert table.loc[("a", "network", "visible"), "auc"] == pytest.approx(1.0)
     assert table.loc[("all", "network", "all"), "accuracy"] == pytest.approx(1.0)
     assert table.loc[("all", "prior", "all"), "auc"] == pytest.approx(0.5)

@@ -10,22 +10,25 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from avn.pipeline.trained import METRICS
 from avn.reporting.model_card import CARD
-from avn.rl.a3c import BEST, CURVE, LAST
+from avn.rl.training import BEST, CURVE, LAST
 
 ROWS = ("a3c_v", "a3c_va", "a3c_va_mapper", "a3c_va_m", "a3c_va_m_mapper")
 # One take of each clip, and sounds that the tests name.
-WORLD = (*(own for own in SMALL if not own.startswith(("sound=", "takes="))), "takes=1")
+WORLD = (
+    *(own for own in SMALL if not own.startswith(("sound=", "realisations="))),
+    "realisations=1",
+)
 RECIPE = (
-    "protocol.exploration=30",
-    "a3c.workers=1",
-    "a3c.episodes=8",
-    "a3c.steps=5",
-    "a3c.total=800",
-    "a3c.validate_every=400",
-    "a3c.validation_starts=1",
-    "a3c.takes=1",
-    "a3c.walks=2",
-    "a3c.refresh=5",
+    "protocol.exploration_steps=30",
+    "algorithm.workers=1",
+    "algorithm.num_envs=8",
+    "algorithm.rollout_length=5",
+    "algorithm.total_steps=800",
+    "algorithm.validate_every=400",
+    "algorithm.validation_starts=1",
+    "algorithm.realisations=1",
+    "algorithm.exploration_walks=2",
+    "algorithm.memory_refresh_interval=5",
 )
 
 
@@ -87,7 +90,7 @@ def test_a_training_that_ended_is_reused_and_one_that_is_missing_is_refused(comm
     before = (Path(out[-1]) / BEST).read_bytes()
     _, out, _ = command("train", "model=a3c_v", *arguments("a3c_v", outputs))
     assert (Path(out[-1]) / BEST).read_bytes() == before
-    more = ("auto=false", "a3c.gamma=0.9", "sound=alarm")
+    more = ("auto=false", "algorithm.gamma=0.9", "sound=alarm")
     code, _, err = command(*walking("a3c_v", outputs, *more))
     assert code == 2
     assert len(err) == 1
@@ -97,16 +100,19 @@ def test_a_training_that_ended_is_reused_and_one_that_is_missing_is_refused(comm
 @pytest.mark.parametrize(
     ("option", "line"),
     [
-        ("a3c.order=sideways", "a3c.order: 'sideways' is none of free, round_robin"),
-        ("a3c.workers=0", "a3c.workers: 0; give 1 or more"),
-        ("a3c.gamma=1.5", "a3c.gamma: 1.5; give 0 to 1"),
+        (
+            "algorithm.update_order=sideways",
+            "algorithm.update_order: 'sideways' is none of free, round_robin",
+        ),
+        ("algorithm.workers=0", "algorithm.workers: 0; give 1 or more"),
+        ("algorithm.gamma=1.5", "algorithm.gamma: 1.5; give 0 to 1"),
         ("baseline.map_width=4", "baseline.map_width: 4; give an odd number"),
-        ("agent.truth=[location]", "agent.truth: only agents that plan"),
+        ("agent.oracle_inputs=[source_estimate]", "agent.oracle_inputs: only agents that plan"),
     ],
 )
 def test_what_cannot_work_is_one_line(command, outputs, option, line):
     row = "a3c_va_mapper" if "map_width" in option else "a3c_v"
-    name, kind = ("eval", "agent") if "truth" in option else ("train", "model")
+    name, kind = ("eval", "agent") if "oracle" in option else ("train", "model")
     code, _, err = command(name, f"{kind}={row}", *arguments(row, outputs, option, kind=kind))
     assert code == 2
     assert len(err) == 1, err
@@ -114,10 +120,10 @@ def test_what_cannot_work_is_one_line(command, outputs, option, line):
 
 
 def test_memory_needs_a_walk(command, outputs):
-    more = arguments("a3c_va_m", outputs, "protocol.exploration=0")
+    more = arguments("a3c_va_m", outputs, "protocol.exploration_steps=0")
     code, _, err = command("train", "model=a3c_va_m", *more)
     assert code == 2
-    assert "protocol.exploration: 0, and an agent with memory explores" in err[-1]
+    assert "protocol.exploration_steps: 0, and an agent with memory explores" in err[-1]
 
 
 def test_a_damaged_checkpoint_is_refused(command, outputs):

@@ -11,8 +11,8 @@ from small import A3C, EYES, SMALL, composed, fitting
 
 from avn.config import saved
 from avn.config.folder import conf_folder
+from avn.config.registry import register
 from avn.config.saved import read_config
-from avn.config.schema import register
 from avn.core.errors import UserError
 from avn.pipeline import replay
 from avn.pipeline.observed import Perceived
@@ -59,7 +59,7 @@ def test_a_run_is_walked_again_from_its_own_config(command, outputs, agent):
 def test_a_config_that_was_written_and_read_makes_the_same(row):
     register()
     with initialize_config_dir(str(conf_folder()), version_base="1.3"):
-        cfg = compose("eval", [f"agent={row}", "split=mini", "sound=clock", "planner.detour=3"])
+        cfg = compose("eval", [f"agent={row}", "split=mini", "sound=clock", "realisations=3"])
     again = saved._typed(OmegaConf.create(OmegaConf.to_yaml(cfg, resolve=True)))
     assert OmegaConf.to_container(again) == OmegaConf.to_container(cfg, resolve=True)
     assert Evaluation(again).fingerprint == Evaluation(cfg).fingerprint
@@ -118,14 +118,14 @@ def episodes() -> pd.DataFrame:
         ("b", "ring", 0, 0.0, 9.0, 9.0),
         ("b", "clock", 1, 0.5, 0.5, 9.0),
     ]
-    columns = ["room", "sound", "success", "spl", "dtg", "geodesic"]
+    columns = ["scene", "sound", "success", "spl", "dtg", "geodesic"]
     return pd.DataFrame(rows, columns=columns)
 
 
 def test_what_is_chosen_is_typical_and_from_everywhere():
     chosen = replay.choose(episodes(), "typical", 2)
     assert chosen[0] == 1  # of the median SPL, and as far away as most
-    assert set(episodes().loc[chosen, "room"]) == {"a", "b"}
+    assert set(episodes().loc[chosen, "scene"]) == {"a", "b"}
     assert set(replay.choose(episodes(), "success", 9)) == {0, 1, 3, 5}
     assert set(replay.choose(episodes(), "failure", 9)) == {2, 4}
     assert replay.choose(episodes()[episodes()["success"] == 1], "failure", 2) == []

@@ -3,6 +3,7 @@
 import pytest
 from small import A3C, EYES, SMALL, composed
 
+from avn.config.spare import compose_fitting
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.run import Evaluation
 from avn.pipeline.stage import make, missing
@@ -16,7 +17,15 @@ def plan(tmp_path):
     def steps(*rows, seeds=(0,), networks=(0,), options=()):
         shared = (*SMALL, *options, f"outputs={tmp_path}")
         return missing(
-            Evaluation(composed(f"agent={row}", f"seed={seed}", f"train_seed={network}", *shared))
+            Evaluation(
+                composed(
+                    f"agent={row}",
+                    f"seed={seed}",
+                    f"train_seed={network}",
+                    *shared,
+                    compose=compose_fitting,
+                )
+            )
             for row in rows
             for seed in seeds
             for network in networks

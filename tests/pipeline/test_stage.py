@@ -9,7 +9,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from avn.core.errors import UserError
-from avn.core.files import written_whole
+from avn.core.files import atomic_write
 from avn.core.hashing import digest
 from avn.pipeline.stage import Stage, build, missing
 
@@ -194,11 +194,11 @@ def test_settings_that_cannot_work_are_refused_before_anything_is_made(config, t
 def test_auto_false_makes_what_was_asked_for_and_nothing_else(config):
     cfg = config(auto=False)
     with pytest.raises(UserError, match=r"ore is missing and auto=false"):
-        build(Steel(cfg), asked=True)
+        build(Steel(cfg), explicit=True)
     with pytest.raises(UserError, match=r"ore is missing and auto=false"):
         build(Ore(cfg))
-    build(Ore(cfg), asked=True)
-    build(Steel(cfg), asked=True)
+    build(Ore(cfg), explicit=True)
+    build(Steel(cfg), explicit=True)
     assert File.made == ["ore", "steel"]
 
 
@@ -206,14 +206,14 @@ def test_a_file_is_there_whole_or_not_at_all(tmp_path):
     path = tmp_path / "file"
 
     def break_off():
-        with written_whole(path) as part:
+        with atomic_write(path) as part:
             part.write_text("half")
             raise RuntimeError
 
     with pytest.raises(RuntimeError):
         break_off()
     assert list(tmp_path.iterdir()) == []
-    with written_whole(path) as part:
+    with atomic_write(path) as part:
         part.write_text("whole")
     assert path.read_text() == "whole"
 

@@ -23,7 +23,7 @@ class Counts(ApartmentTensors):
         return "counts"
 
     def settings(self):
-        return ("takes",)
+        return ("realisations",)
 
     def content_of(self, plan):
         return plan.to_dict()
@@ -55,7 +55,7 @@ def test_each_apartment_is_made_once(counts):
     assert missing([counts()]) != []
     build(counts())
     assert Counts.made[5:] == [2]
-    build(counts("takes=2"))
+    build(counts("realisations=2"))
     assert Counts.made[6:] == [0, 1, 2, 3, 4]
 
 

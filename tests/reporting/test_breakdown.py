@@ -9,7 +9,7 @@ def episodes() -> pd.DataFrame:
     """Near ones in sight succeed, far ones behind doorways do not."""
     return pd.DataFrame(
         {
-            "room": ["a", "a", "b", "b", "b"],
+            "scene": ["a", "a", "b", "b", "b"],
             "source": [0, 1, 0, 1, 2],
             "geodesic": [1.0, 2.0, 5.5, 11.0, 12.0],
             "in_sight": [1, 1, 0, 0, 0],

@@ -20,7 +20,7 @@ def test_what_is_heard_is_the_mean_of_the_rooms():
 
 def test_windows_are_those_of_all_rooms():
     row = {"by": "network", "cells": "visible", "ece": 0.0131, "loss": 0.3, "accuracy": 0.9}
-    seen = pd.DataFrame([{**row, "room": "a", "auc": 0.5}, {**row, "room": "all", "auc": 0.9512}])
+    seen = pd.DataFrame([{**row, "scene": "a", "auc": 0.5}, {**row, "scene": "all", "auc": 0.9512}])
     found = lines(windows_table(seen))
     assert found[-1] == "network, visible cells 0.951 90.0 % 0.013"
     assert len(found) == 3  # title, head, one row

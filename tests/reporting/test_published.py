@@ -20,7 +20,7 @@ def episodes(seed: int, share: float, agent: str = "greedy") -> pd.DataFrame:
             for number in range(40):
                 row = dict.fromkeys(EPISODE_COLUMNS, 0)
                 row |= {"agent": agent, "protocol": "var", "acoustics": "resonance", "look": "once"}
-                row |= {"room": room, "sound": sound, "seed": seed, "episode": number}
+                row |= {"scene": room, "sound": sound, "seed": seed, "episode": number}
                 row["source"], row["outcome"] = number % 5, "success"
                 row["success"] = int(generator.random() < share)
                 row["spl"] = row["success"] / 2
@@ -36,26 +36,26 @@ def table():
 
 def test_cells_are_means_over_seeds_beside_the_papers_own(table):
     cells, walked = table
-    one = cells[(cells["room"] == "room_1") & (cells["sound"] == "ring")].iloc[0]
-    own = walked[(walked["room"] == "room_1") & (walked["sound"] == "ring")]
+    one = cells[(cells["scene"] == "room_1") & (cells["sound"] == "ring")].iloc[0]
+    own = walked[(walked["scene"] == "room_1") & (walked["sound"] == "ring")]
     assert one["sr"] == pytest.approx(100 * own["success"].mean())
     assert one["spl"] == pytest.approx(50 * own["success"].mean())
     each = own.groupby("seed")["success"].mean()
     assert one["sr_std"] == pytest.approx(100 * each.std(ddof=1))
     assert one["sr_low"] < one["sr"] < one["sr_high"]
-    paper = paper_table().set_index(["agent", "sound", "room"]).loc[("greedy", "ring", "room_1")]
+    paper = paper_table().set_index(["agent", "sound", "scene"]).loc[("greedy", "ring", "room_1")]
     assert (one["paper_sr"], one["paper_spl"]) == (paper["sr"], paper["spl"])
 
 
 def test_the_average_is_that_of_the_rooms(table):
     cells, _ = table
-    ring = cells[cells["sound"] == "ring"].set_index("room")["sr"]
+    ring = cells[cells["sound"] == "ring"].set_index("scene")["sr"]
     assert ring["average"] == pytest.approx(ring[["room_1", "room_2"]].mean())
 
 
 def test_a_cell_has_its_interval_its_spread_and_the_papers_own(table):
     cells, _ = table
-    one = cells[(cells["room"] == "room_1") & (cells["sound"] == "ring")].iloc[0]
+    one = cells[(cells["scene"] == "room_1") & (cells["sound"] == "ring")].iloc[0]
     lines = [
         f"{one['sr']:.1f} / {one['spl']:.1f}",
         f"{one['sr_low']:.0f}-{one['sr_high']:.0f} / {one['spl_low']:.0f}-{one['spl_high']:.0f}",

@@ -28,7 +28,7 @@ def episodes(
             "acoustics": "resonance",
             "look": "once",
             "sound": sound,
-            "room": room,
+            "scene": room,
             "seed": seed,
             "episode": source * count + index,
             "start_cell": index,
@@ -57,7 +57,7 @@ def only(results: pd.DataFrame, **labels: str) -> pd.Series:
 
 def test_columns_are_the_published_ones() -> None:
     assert ",".join(RESULT_COLUMNS) == (
-        "agent,protocol,acoustics,look,sound,room,seed,episodes,sr,spl,softspl,sna,dtg,"
+        "agent,protocol,acoustics,look,sound,scene,seed,episodes,sr,spl,softspl,sna,dtg,"
         "sr_low,sr_high,spl_low,spl_high,softspl_low,softspl_high,sna_low,sna_high,"
         "dtg_low,dtg_high"
     )
@@ -69,8 +69,8 @@ def test_figures_are_means_by_sound_and_room() -> None:
     frame = episodes()
     results = summarise(frame)
     assert len(results) == 3 * 3
-    own = frame[(frame["sound"] == "alarm") & (frame["room"] == "room_2")]
-    row = only(results, sound="alarm", room="room_2")
+    own = frame[(frame["sound"] == "alarm") & (frame["scene"] == "room_2")]
+    row = only(results, sound="alarm", scene="room_2")
     assert row["episodes"] == 40
     for figure, column in (("sr", "success"), ("spl", "spl"), ("sna", "sna"), ("dtg", "dtg")):
         assert row[figure] == pytest.approx(own[column].mean())
@@ -81,22 +81,22 @@ def test_average_counts_every_room_the_same() -> None:
     frame = episodes()
     results = summarise(frame)
     for sound in ("ring", "alarm", "all"):
-        rooms = [only(results, sound=sound, room=room)["spl"] for room in ("room_1", "room_2")]
-        assert only(results, sound=sound, room="average")["spl"] == pytest.approx(np.mean(rooms))
-    assert only(results, sound="all", room="room_1")["episodes"] == 40
-    assert only(results, sound="all", room="average")["episodes"] == 120
-    assert frame["spl"].mean() != pytest.approx(only(results, sound="all", room="average")["spl"])
+        rooms = [only(results, sound=sound, scene=room)["spl"] for room in ("room_1", "room_2")]
+        assert only(results, sound=sound, scene="average")["spl"] == pytest.approx(np.mean(rooms))
+    assert only(results, sound="all", scene="room_1")["episodes"] == 40
+    assert only(results, sound="all", scene="average")["episodes"] == 120
+    assert frame["spl"].mean() != pytest.approx(only(results, sound="all", scene="average")["spl"])
 
 
 def test_one_sound_has_no_row_for_all() -> None:
     results = summarise(episodes(sounds=("alarm",)))
     assert set(results["sound"]) == {"alarm"}
-    assert headline(results)["sr"] == only(results, sound="alarm", room="average")["sr"]
+    assert headline(results)["sr"] == only(results, sound="alarm", scene="average")["sr"]
 
 
 def test_headline_is_over_all_sounds_and_rooms() -> None:
     results = summarise(episodes())
-    assert headline(results)["spl"] == only(results, sound="all", room="average")["spl"]
+    assert headline(results)["spl"] == only(results, sound="all", scene="average")["spl"]
     with pytest.raises(ValueError, match="one average"):
         headline(summarise(pd.concat([episodes(), episodes("oracle")])))
 
@@ -110,8 +110,8 @@ def test_across_seeds_gives_mean_and_spread() -> None:
     results = pd.concat([summarise(episodes(seed=seed)) for seed in range(3)])
     table = across_seeds(results)
     assert len(table) == 9
-    row = only(table, sound="all", room="average")
-    figures = results[(results["sound"] == "all") & (results["room"] == "average")]["sr"]
+    row = only(table, sound="all", scene="average")
+    figures = results[(results["sound"] == "all") & (results["scene"] == "average")]["sr"]
     assert row["seeds"] == 3
     assert row["sr"] == pytest.approx(figures.mean())
     assert row["sr_std"] == pytest.approx(np.std(figures, ddof=1))
@@ -121,7 +121,7 @@ def test_compare_pairs_the_episodes() -> None:
     one, other = episodes(), episodes("oracle")
     shuffled = other.sample(frac=1.0, random_state=0)
     table = compare(one, shuffled).set_index("figure")
-    rooms = (one["dtg"] - other["dtg"]).groupby(one["room"]).mean()
+    rooms = (one["dtg"] - other["dtg"]).groupby(one["scene"]).mean()
     assert table.loc["dtg", "difference"] == pytest.approx(rooms.mean())
     assert (table["low"] < table["difference"]).all()
     assert (table["difference"] < table["high"]).all()

@@ -27,7 +27,7 @@ def test_the_map_shows_the_mean_over_headings_and_the_goal() -> None:
     scene = synthetic_scene()
     goal = goal_cells(scene.grid)[scene.sources[0]]
     probability = np.linspace(0, 1, 4 * scene.grid.cells)
-    figure = stop_map(scene.plan, scene.grid.lattice, probability, goal, "room")
+    figure = stop_map(scene.plan, scene.grid.lattice, probability, goal, "scene")
     drawn, circled = figure.axes[0].collections
     np.testing.assert_allclose(drawn.get_array(), probability.reshape(-1, 4).mean(1))
     assert len(circled.get_offsets()) == goal.sum()

@@ -20,7 +20,7 @@ def results(agent: str, protocol: str = "var") -> pd.DataFrame:
 def episodes() -> pd.DataFrame:
     return pd.DataFrame(
         {
-            "room": ["room_1", "room_1", "room_2"],
+            "scene": ["room_1", "room_1", "room_2"],
             "rooms_crossed": [0, 2, 1],
             "in_sight": [1, 0, 1],
             "geodesic": [2.0, 6.0, 4.0],
@@ -66,7 +66,7 @@ def test_no_figures_of_the_paper_where_it_has_none(agent: str, protocol: str) ->
 
 
 def test_hardness_by_hand() -> None:
-    table = hardness(episodes()).set_index("room")
+    table = hardness(episodes()).set_index("scene")
     assert table.loc["room_1"].to_dict() == {
         "episodes": 2,
         "other_room": 0.5,
@@ -93,7 +93,7 @@ def test_hardness_is_printed() -> None:
 def test_paper_table_is_whole_and_its_averages_are_means_over_rooms() -> None:
     table = paper_table()
     assert len(table) == 9 * 3 * 6
-    wide = table.pivot_table(index=["agent", "sound"], columns="room", values=["sr", "spl"])
+    wide = table.pivot_table(index=["agent", "sound"], columns="scene", values=["sr", "spl"])
     assert not wide.isna().any().any()
     rooms = [f"room_{number}" for number in range(1, 6)]
     for figure in ("sr", "spl"):
@@ -114,6 +114,6 @@ def test_paper_table_is_whole_and_its_averages_are_means_over_rooms() -> None:
 )
 def test_paper_averages_over_its_sounds(agent: str, sr: float, spl: float) -> None:
     table = paper_table()
-    average = table[(table["agent"] == agent) & (table["room"] == "average")]
+    average = table[(table["agent"] == agent) & (table["scene"] == "average")]
     assert average["sr"].mean() == pytest.approx(sr, abs=0.06)
     assert average["spl"].mean() == pytest.approx(spl, abs=0.06)

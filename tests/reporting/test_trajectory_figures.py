@@ -21,7 +21,7 @@ def test_each_run_has_its_line_in_each_episode() -> None:
             assert np.ptp(off, axis=0) == pytest.approx(0)
             assert np.abs(off).max() < 0.1
         assert labels[0].startswith("ours: success")
-        assert "room" not in axes.get_title()
+        assert "scene" not in axes.get_title()
         assert "episode" in axes.get_title()
 
 

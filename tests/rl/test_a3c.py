@@ -1,210 +1,109 @@
-import os
-import signal
-import time
-
 import pytest
 import torch
-from small_worlds import make_task, make_walks, make_worker, random_tables
+from small_worlds import make_spec, make_worker, random_tables
 from torch.nn import functional as F
 
-from avn.core.errors import UserError
-from avn.rl import a3c, crew
-from avn.rl.a3c import BEST, LAST, Training, load_network, read_checkpoint
-from avn.rl.networks import ActorCritic, sample
-from avn.rl.shared import SharedState
+from avn.rl.a3c import ActorCriticLoss
+from avn.rl.rollouts import advantages_and_targets, trunk_outputs
 
 
-def measure(network):
-    """A figure that no two networks share."""
-    return {"validation/spl": float(network.actor.weight.detach().sum())}
+def batch_of(spec):
+    worker = make_worker(spec)
+    for _ in range(3):
+        batch = worker.collector.collect()
+    return worker, batch
 
 
-def training(task, folder, made_from="a" * 64) -> Training:
-    torch.manual_seed(1)
-    network = ActorCritic(task.shape)
-    network.load_state_dict(task.buffers, strict=False)
-    return Training(task, network, folder, measure, made_from)
-
-
-def test_shared_rmsprop_is_that_of_torch():
-    generator = torch.Generator().manual_seed(0)
-    weights = torch.randn(50, generator=generator)
-    reference = torch.nn.Parameter(weights.clone())
-    optimiser = torch.optim.RMSprop([reference], lr=0.01, alpha=0.9, eps=0.1)
-    shared = SharedState.of(weights)
-    for _ in range(20):
-        gradient = torch.randn(50, generator=generator)
-        reference.grad = gradient.clone()
-        optimiser.step()
-        shared.apply(gradient, lambda done: 0.01, 0.9, 0.1)
-    assert torch.allclose(shared.weights, reference.detach(), atol=1e-6)
-
-
-@pytest.mark.parametrize("memory", [0, 5])
-def test_one_worker_is_synchronous_a2c_step_for_step(flat, rules, memory):
-    """Against a plain loop: its own returns, losses, clipping and torch's RMSProp."""
-    tables = random_tables([flat], rules)
-    task = make_task(tables, rules, memory=memory, clip=0.5, lr=0.01, eps=1e-3, schedule="constant")
-    worker, twin = make_worker(task), make_worker(task)
-    network, env, draws = twin.network, twin.env, twin.policy.generator
-    parameters = [torch.nn.Parameter(p.detach().clone()) for p in network.parameters()]
-    optimiser = torch.optim.RMSprop(parameters, lr=0.01, alpha=0.99, eps=1e-3)
-    for _ in range(8):
-        worker.update()
-        seen, logs, values, entropies, rewards, ends = env.look(), [], [], [], [], []
-        h, c = env.look().get("h"), env.look().get("c")
-        if not memory:
-            h, c = network.no_memory(6)
-        for _ in range(5):
-            features = env.features(seen["state"], seen["clip"])
-            joint, h_next, c_next = network.remember(network.embed(features), h, c)
-            logits = network.actor(joint)
-            action = sample(logits.detach(), draws)
-            log_p = F.log_softmax(logits, dim=1)
-            logs.append(log_p.gather(1, action[:, None])[:, 0])
-            entropies.append(-(log_p.exp() * log_p).sum(dim=1))
-            values.append(network.critic(joint)[:, 0])
-            kept = (h_next.detach(), c_next.detach()) if memory else ()
-            reward, terminated, truncated = env.move(action, *kept)
-            rewards.append(reward)
-            with torch.no_grad():
-                after = env.look()
-                embedding = network.embed(env.features(after["state"], after["clip"]))
-                last, *_ = network.remember(embedding, h_next, c_next)
-                ends.append((terminated, truncated, network.critic(last)[:, 0]))
-            done = terminated | truncated
-            fresh = done[:, None, None]
-            if done.any():
-                env.begin(done)
-            seen = env.look()
-            h, c = torch.where(fresh, 0.0, h_next), torch.where(fresh, 0.0, c_next)
-        ahead, targets = ends[-1][2], []
-        for reward, (terminated, truncated, value) in zip(rewards[::-1], ends[::-1], strict=True):
-            ahead = torch.where(truncated, value, ahead) * ~terminated
-            ahead = reward + 0.99 * ahead
-            targets.insert(0, ahead)
-        target, value = torch.stack(targets), torch.stack(values)
-        loss = -(torch.stack(logs) * (target - value).detach()).mean()
-        loss = loss - 0.01 * torch.stack(entropies).mean() + 0.5 * ((value - target) ** 2).mean()
-        twin.gradients.zero_()
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 0.5)
-        for parameter, own in zip(parameters, network.parameters(), strict=True):
-            parameter.grad = own.grad.clone()
-        optimiser.step()
-        with torch.no_grad():
-            for parameter, own in zip(parameters, network.parameters(), strict=True):
-                own.copy_(parameter)
-    assert torch.allclose(worker.shared.weights, twin.weights, atol=1e-5)
-    assert not torch.allclose(worker.shared.weights, make_worker(task).shared.weights, atol=1e-3)
+def returns_by_hand(worker, batch, gamma):
+    """n-step returns, one episode and step at a time."""
+    network = worker.network
+    after = batch["next"]
+    features = worker.env.features(after["index", "state"], after["index", "clip"])
+    found = torch.zeros(batch.batch_size)
+    with torch.no_grad():
+        for row in range(batch.batch_size[0]):
+            for step in reversed(range(batch.batch_size[1])):
+                reward = float(after["reward"][row, step])
+                shown = {name: value[row, step][None] for name, value in features.items()}
+                embedding = network.embed(shown)
+                if network.lstm is not None:
+                    memory = (batch[key][row, step][None] for key in ("h_next", "c_next"))
+                    embedding, *_ = network.remember(embedding, *memory)
+                last = step == batch.batch_size[1] - 1
+                if after["terminated"][row, step]:
+                    ahead = 0.0
+                elif after["truncated"][row, step] or last:
+                    ahead = float(network.critic(embedding))
+                else:
+                    ahead = float(found[row, step + 1])
+                found[row, step] = reward + gamma * ahead
+    return found
 
 
 @pytest.mark.parametrize("memory", [0, 5])
-def test_a_training_that_was_killed_goes_on_as_if_it_had_not_been(flat, rules, tmp_path, memory):
-    tables = random_tables([flat], rules)
-    walks = make_walks(tables) if memory else None
-    maps = 2 if memory else 1
-    task = make_task(
-        tables, rules, walks=walks, memory=memory, maps=maps, total=1200, validate_every=300
+def test_returns_end_at_the_goal_and_go_on_where_an_episode_was_cut_off(flat, rules, memory):
+    spec = make_spec(random_tables([flat], rules), rules, memory=memory, max_steps=4, gamma=0.9)
+    worker, batch = batch_of(spec)
+    ended = batch["next"]
+    assert ended["truncated"].any()
+    network, features = worker.network, worker.env.features
+    value = network.critic(trunk_outputs(network, features, batch)).detach()
+    advantage, target = advantages_and_targets(network, features, batch, value, 0.9, 1.0)
+    expected = returns_by_hand(worker, batch, 0.9)
+    assert torch.allclose(target[..., 0], expected, atol=1e-4)
+    assert torch.allclose(advantage, target - value, atol=1e-4)
+
+
+def test_the_loss_is_that_of_a3c(flat, rules):
+    spec = make_spec(random_tables([flat], rules), rules, entropy_coef=0.02, value_coef=0.5)
+    worker, batch = batch_of(spec)
+    total, figures = worker.loss(batch)
+    network, features = worker.network, worker.env.features
+    joint = trunk_outputs(network, features, batch)
+    logits, value = network.actor(joint), network.critic(joint)
+    advantage, target = advantages_and_targets(
+        network, features, batch, value.detach(), spec.recipe.gamma, spec.recipe.gae_lambda
     )
-    whole = training(task, tmp_path / "whole")
-    whole.run()
-    assert len(whole.curve) == 5  # untrained, and four rounds
-    training(task, tmp_path / "killed").run(rounds=2)
-    again = training(task, tmp_path / "killed")
-    assert again.steps == 600
-    again.run()
-    assert torch.equal(again.shared.weights, whole.shared.weights)
-    assert torch.equal(again.shared.moments, whole.shared.moments)
-    times = ("steps_per_second",)
-    for one, other in zip(again.curve, whole.curve, strict=True):
-        assert {k: v for k, v in one.items() if k not in times} == {
-            k: v for k, v in other.items() if k not in times
-        }
+    log_p = F.log_softmax(logits, dim=-1)
+    chosen = log_p.gather(-1, batch["action"][..., None])
+    entropy = -(log_p.exp() * log_p).sum(dim=-1).mean()
+    expected = -(chosen * advantage).mean() - 0.02 * entropy + 0.5 * F.mse_loss(value, target)
+    assert float(total) == pytest.approx(float(expected), rel=1e-5)
+    assert figures["entropy"] == pytest.approx(float(entropy), rel=1e-5)
 
 
-def test_two_workers_in_turn_give_the_same_bytes_every_time_and_a_round_at_a_time(
-    flat, rules, tmp_path
-):
-    options = {"workers": 2, "total": 960, "validate_every": 480}
-    task = make_task(random_tables([flat], rules), rules, **options)
-    once, pieces = training(task, tmp_path / "once"), training(task, tmp_path / "pieces")
-    once.run()
-    pieces.run(rounds=1)
-    again = training(task, tmp_path / "pieces")
-    again.run()
-    assert torch.equal(once.shared.weights, again.shared.weights)
-    alone = training(make_task(task.tables, rules, total=960), tmp_path / "alone")
-    alone.run()
-    assert not torch.equal(once.shared.weights, alone.shared.weights)
+@pytest.mark.parametrize("memory", [0, 3])
+def test_gradients_agree_with_finite_differences(flat, rules, memory, monkeypatch):
+    spec = make_spec(random_tables([flat], rules), rules, memory=memory, width=4, maps=1)
+    worker, batch = batch_of(spec)
+    network = worker.network.double()
+    torch.manual_seed(1)
+    for bias in (network.bias, network.second.bias):  # off the corners of the ReLUs
+        bias.data += torch.randn_like(bias)
+    batch = batch.apply(lambda t: t.double() if t.is_floating_point() else t)
+    features = worker.env.features.double()
+    loss = ActorCriticLoss(network, features, spec.recipe)
+    joint = trunk_outputs(network, features, batch)
+    with torch.no_grad():
+        fixed = advantages_and_targets(network, features, batch, network.critic(joint), 0.99, 1.0)
+    # targets and advantages are no part of the gradient
+    monkeypatch.setattr("avn.rl.a3c.advantages_and_targets", lambda *_: fixed)
 
+    def value() -> float:
+        return float(loss(batch)[0].detach())
 
-def test_workers_that_run_freely_apply_all_their_gradients(flat, rules, tmp_path):
-    options = {"workers": 2, "order": "free", "total": 1200, "validate_every": 600}
-    free = training(make_task(random_tables([flat], rules), rules, **options), tmp_path / "free")
-    free.run()
-    assert free.steps == 1200
-    assert {"entropy", "loss/value", "gradient_norm", "steps_per_second"} <= free.curve[-1].keys()
-
-
-def test_a_worker_that_dies_ends_the_run_and_leaves_the_last_checkpoint_whole(
-    flat, rules, tmp_path, monkeypatch
-):
-    options = {"workers": 2, "total": 3_000_000, "validate_every": 300}
-    task = make_task(random_tables([flat], rules), rules, **options)
-    killed = []
-
-    class Murderous(crew.SpawnedCrew):
-        def round(self, updates, progress):
-            if len(read_checkpoint(tmp_path / LAST, "a" * 64)["curve"]) == 2:
-                killed.append(self._processes[1].pid)
-                os.kill(self._processes[1].pid, signal.SIGKILL)
-                time.sleep(0.1)
-            return super().round(updates, progress)
-
-    monkeypatch.setattr(a3c, "start_crew", Murderous)
-    with pytest.raises(UserError, match=r"worker 1 died.*the last checkpoint is whole"):
-        training(task, tmp_path).run()
-    assert killed
-    assert len(read_checkpoint(tmp_path / LAST, "a" * 64)["curve"]) == 2
-    assert training(task, tmp_path).steps == 300
-
-
-def test_what_a_worker_refuses_is_said_in_one_line(flat, rules, tmp_path):
-    task = make_task(random_tables([flat], rules), rules, workers=2, total=600, maps=1)
-    object.__setattr__(task, "map_size", 5)  # a map that no agent fits on
-    with pytest.raises(UserError, match=r"mapper\.size|baseline\.map_width"):
-        training(task, tmp_path).run()
-
-
-def test_more_workers_than_cores_are_warned_of(flat, rules, capsys, monkeypatch):
-    monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    monkeypatch.setattr(crew, "SpawnedCrew", lambda *_: None)
-    task = make_task(random_tables([flat], rules), rules, workers=2)
-    crew.start_crew(task, None, [])
-    assert "2 workers share 1 cores" in capsys.readouterr().out
-
-
-def test_checkpoints_of_another_row_and_damaged_ones_are_refused(flat, rules, tmp_path):
-    task = make_task(random_tables([flat], rules), rules, total=60, validate_every=60)
-    training(task, tmp_path).run()
-    with pytest.raises(UserError, match="of another row or recipe"):
-        training(task, tmp_path, made_from="b" * 64)
-    network = ActorCritic(task.shape)
-    load_network(network, tmp_path / BEST, "a" * 64)
-    other = make_task(task.tables, rules, inputs=("feature",))
-    with pytest.raises(UserError, match="features or sizes"):
-        load_network(ActorCritic(other.shape), tmp_path / BEST, "a" * 64)
-    (tmp_path / BEST).write_bytes(b"no checkpoint")
-    with pytest.raises(UserError, match="damaged"):
-        load_network(network, tmp_path / BEST, "a" * 64)
-
-
-def test_the_best_on_validation_is_kept(flat, rules, tmp_path):
-    task = make_task(random_tables([flat], rules), rules, total=600, validate_every=60)
-    kept = training(task, tmp_path)
-    kept.run()
-    network = ActorCritic(task.shape)
-    load_network(network, tmp_path / BEST, "a" * 64)
-    best = max(own["validation/spl"] for own in kept.curve)
-    assert measure(network)["validation/spl"] == pytest.approx(best)
+    for parameter in network.parameters():
+        parameter.grad = None
+    loss(batch)[0].backward()
+    generator = torch.Generator().manual_seed(0)
+    for name, parameter in network.named_parameters():
+        gradient = torch.zeros_like(parameter) if parameter.grad is None else parameter.grad
+        way = torch.randn(parameter.shape, generator=generator, dtype=torch.float64)
+        with torch.no_grad():
+            parameter += 1e-6 * way
+            above = value()
+            parameter -= 2e-6 * way
+            below = value()
+            parameter += 1e-6 * way
+        slope = float((gradient * way).sum())
+        assert (above - below) / 2e-6 == pytest.approx(slope, rel=1e-4, abs=1e-7), name

@@ -1,24 +1,28 @@
 import pytest
 import torch
-from small_worlds import make_task, make_walks, make_worker, random_tables
+from small_worlds import make_spec, make_walks, make_worker, random_tables
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import check_env_specs
 
 from avn.core.errors import UserError
-from avn.navigation.starts import Starts, build_starts
-from avn.navigation.world import World
-from avn.rl.collectors import LeanCollector, TorchrlCollector
+from avn.navigation.batched_episodes import BatchedEpisodes
+from avn.navigation.start_sampler import StartSampler, build_start_sampler
+from avn.rl.collectors import TensorCollector, TorchrlCollector
 from avn.rl.environment import WalkEnv
-from avn.rl.policy import Policy, Resolving
+from avn.rl.policy import FeatureLookup, Policy
 
-ALL = ("feature", "sound_feature", "collided", "odometry", "map")
+ALL = ("visual_embedding", "audio_embedding", "collided", "odometry", "map")
 
 
 def make_env(tables, rules, n=6, seed=0, **options) -> WalkEnv:
     observes = options.pop("observes", ALL)
     options = {"map_size": 41, "map_width": 11} | options
-    return WalkEnv(World(tables, build_starts(tables), n, rules, 9, seed=seed), observes, **options)
+    return WalkEnv(
+        BatchedEpisodes(tables, build_start_sampler(tables), n, rules, 9, seed=seed),
+        observes,
+        **options,
+    )
 
 
 @pytest.mark.parametrize("resolved", [True, False])
@@ -56,7 +60,9 @@ def test_only_rows_whose_episode_ended_begin_anew(flat, rules):
         ended = both["next", "done"][:, 0]
         ends += int(ended.sum())
         assert torch.equal(after["odometry"][~ended], both["next", "odometry"][~ended])
-        assert torch.equal(after["feature"][~ended], both["next", "feature"][~ended])
+        assert torch.equal(
+            after["visual_embedding"][~ended], both["next", "visual_embedding"][~ended]
+        )
         assert not after["odometry"][ended].any()
         assert torch.equal(after["is_init"], both["next", "done"])
         first = after
@@ -77,16 +83,18 @@ class Spy(TensorDictModuleBase):
 
 def test_a_policy_is_shown_features_and_never_a_number(flat, rules):
     tables = random_tables([flat], rules)
-    env = make_env(tables, rules, observes=("feature", "sound_feature", "map"), resolved=False)
-    spy = Spy(["feature", "sound_feature", "map"])
-    env.rollout(5, Resolving(env.features, spy), break_when_any_done=False)
+    env = make_env(
+        tables, rules, observes=("visual_embedding", "audio_embedding", "map"), resolved=False
+    )
+    spy = Spy(["visual_embedding", "audio_embedding", "map"])
+    env.rollout(5, FeatureLookup(env.features, spy), break_when_any_done=False)
     for shown in spy.shown:
         assert set(shown.keys(include_nested=True, leaves_only=True)) == set(spy.in_keys)
         assert all(value.is_floating_point() for value in shown.values())
     numbers = env.rollout(1)["index"][:, 0]
-    expected = tables.visual["feature"][numbers["state"]]
+    expected = tables.visual["visual_embedding"][numbers["state"]]
     features = env.features(numbers["state"], numbers["clip"])
-    assert torch.equal(features["feature"], expected)
+    assert torch.equal(features["visual_embedding"], expected)
 
 
 def test_resolved_observations_are_those_that_the_numbers_stand_for(flat, rules):
@@ -94,7 +102,7 @@ def test_resolved_observations_are_those_that_the_numbers_stand_for(flat, rules)
     near, far = (make_env(tables, rules, resolved=r, seed=4) for r in (True, False))
     shown, numbers = near.reset(), far.reset()
     found = far.features(numbers["index", "state"], numbers["index", "clip"])
-    for name in ("feature", "sound_feature"):
+    for name in ("visual_embedding", "audio_embedding"):
         assert torch.equal(shown[name], found[name])
 
 
@@ -105,46 +113,48 @@ def test_both_collectors_give_the_same_batches(flat, rules, memory, maps):
     walks = make_walks(tables) if memory else None
     maps = min(maps, 2 if memory else 1)
     batches = []
-    for collector in (LeanCollector, TorchrlCollector):
-        task = make_task(tables, rules, walks=walks, memory=memory, maps=maps)
-        worker = make_worker(task)
+    for collector in (TensorCollector, TorchrlCollector):
+        spec = make_spec(tables, rules, walks=walks, memory=memory, maps=maps)
+        worker = make_worker(spec)
         policy = Policy(worker.network, torch.Generator().manual_seed(7))
         gathering = collector(worker.env, policy, steps=5)
         batches.append([gathering.collect().clone() for _ in range(6)])
-    lean, torchrl = batches
-    for one, other in zip(lean, torchrl, strict=True):
+    tensor, torchrl = batches
+    for one, other in zip(tensor, torchrl, strict=True):
         assert one.batch_size == other.batch_size == (6, 5)
         for key in one.keys(include_nested=True, leaves_only=True):
             assert torch.equal(one[key], other[key]), key
-    assert any(bool(batch["next", "terminated"].any()) for batch in lean)
-    assert any(bool(batch["next", "truncated"].any()) for batch in lean)
+    assert any(bool(batch["next", "terminated"].any()) for batch in tensor)
+    assert any(bool(batch["next", "truncated"].any()) for batch in tensor)
 
 
 def test_the_map_is_that_of_where_the_agent_has_been_and_begins_unknown(flat, rules):
     tables = random_tables([flat], rules)
-    tables.visual["window"][:] = torch.nan  # nothing is seen: only what it stands on and runs into
+    tables.visual["local_patch"][:] = (
+        torch.nan
+    )  # nothing is seen: only what it stands on and runs into
     env = make_env(tables, rules, n=1, observes=("map",))
     east, sources = 1, len(tables.source_room)
     begins = torch.zeros(sources, dtype=torch.int64)
-    env.world.starts = Starts(1, torch.tensor([4 * 2 + east]), begins, begins + 1)
+    env.world.starts = StartSampler(1, torch.tensor([4 * 2 + east]), begins, begins + 1)
     env.begin(torch.tensor([True]))
-    assert env.look()["map"].unique().tolist() == [0.5, 1.0]  # it stands somewhere
+    assert env.observation()["map"].unique().tolist() == [0.5, 1.0]  # it stands somewhere
     env.move(torch.tensor([0]))
-    around = env.look()["map"][0, 0]
+    around = env.observation()["map"][0, 0]
     assert around[5, 5] == 1.0
     assert around[4, 5] == 1.0
     assert int((around != 0.5).sum()) == 2
     env.move(torch.tensor([3]))  # to the right: what was behind is now to its right
-    around = env.look()["map"][0, 0]
+    around = env.observation()["map"][0, 0]
     assert around[5, 5] == 1.0
     assert around[5, 6] == 1.0
     env.begin(torch.tensor([True]))
-    assert int((env.look()["map"] != 0.5).sum()) == 1
+    assert int((env.observation()["map"] != 0.5).sum()) == 1
 
 
 def test_the_batch_axes_are_episodes_and_steps(flat, rules):
     tables = random_tables([flat], rules)
-    batch = make_worker(make_task(tables, rules)).collector.collect()
+    batch = make_worker(make_spec(tables, rules)).collector.collect()
     assert isinstance(batch, TensorDict)
     done = batch["next", "done"][:, :-1, 0]
     assert torch.equal(batch["is_init"][:, 1:, 0], done)

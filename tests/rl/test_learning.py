@@ -1,30 +1,37 @@
 """A3C learns what there is to learn: the shortest way, and to remember."""
 
 import torch
-from small_worlds import make_task, make_worker
+from small_worlds import make_spec, make_worker
 
 from avn.navigation.distances import fewest_actions
 from avn.navigation.observations import SceneObservations
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
-from avn.navigation.starts import Starts
-from avn.navigation.tables import build_tables
+from avn.navigation.scene_batch import build_scene_batch
+from avn.navigation.start_sampler import StartSampler
 
-RULES = Protocol("var", "box", False, "attempted", moves_factor=2.0)
-LEARN = {"episodes": 16, "steps": 10, "lr": 3e-3, "eps": 1e-5, "schedule": "constant", "width": 32}
+RULES = Protocol("var", "box", False, "moves", max_moves_ratio=2.0)
+LEARN = {
+    "num_envs": 16,
+    "rollout_length": 10,
+    "lr": 3e-3,
+    "eps": 1e-5,
+    "schedule": "constant",
+    "width": 32,
+}
 
 
 def one_hot_tables(place, hearing=None):
     """Every state looks like no other."""
     states = 4 * len(place.grid.lattice)
-    audio = {} if hearing is None else {"sound_feature": hearing}
-    observed = SceneObservations(audio, {"feature": torch.eye(states)})
-    return build_tables([place], RULES, [observed])
+    audio = {} if hearing is None else {"audio_embedding": hearing}
+    observed = SceneObservations(audio, {"visual_embedding": torch.eye(states)})
+    return build_scene_batch([place], RULES, [observed])
 
 
-def learned(task, updates):
-    worker = make_worker(task)
+def learned(spec, updates):
+    worker = make_worker(spec)
     for _ in range(updates):
         worker.update()
     return worker
@@ -34,8 +41,8 @@ def test_a_corridor_is_solved_to_the_optimal_return():
     place = draw("corridor", "aaaaaaaA")
     tables = one_hot_tables(place)
     reward = RewardConfig(step=-0.5, collision=-0.5)  # so that an action more is worth avoiding
-    options = {"inputs": ("feature",), "max_steps": 40, "reward": reward, "gamma": 0.9}
-    worker = learned(make_task(tables, RULES, **(LEARN | options)), 800)
+    options = {"inputs": ("visual_embedding",), "max_steps": 40, "reward": reward, "gamma": 0.9}
+    worker = learned(make_spec(tables, RULES, **(LEARN | options)), 800)
     goal = tables.goal.reshape(1, -1)[:, ::4].numpy()
     optimum = fewest_actions(place.grid.neighbours, goal, 8)[8, 0]
     world, network = worker.env.world, worker.network
@@ -43,7 +50,9 @@ def test_a_corridor_is_solved_to_the_optimal_return():
     state, earned, done = starts.clone(), torch.zeros(len(starts)), starts < 0
     for _ in range(20):
         with torch.no_grad():
-            action = network.actor(network.embed({"feature": torch.eye(tables.states)[state]}))
+            action = network.actor(
+                network.embed({"visual_embedding": torch.eye(tables.states)[state]})
+            )
         world.state, world.source = state, torch.zeros_like(state)
         world.n, world.actions, world.attempted = len(state), state * 0, state * 0
         reward, terminated, _ = world.step(action.argmax(dim=1))
@@ -74,9 +83,9 @@ def t_maze_success(memory: int) -> float:
     cue[:, start, 0, 0, 0] = torch.where(torch.from_numpy(left), -1.0, 1.0)
     tables = one_hot_tables(place, cue)
     # three moves, a turn and two moves arrive; a wrong turn does not leave enough
-    task = make_task(tables, RULES, memory=memory, max_steps=8, **(LEARN | {"entropy": 0.02}))
-    worker = make_worker(task)
-    worker.env.world.starts = Starts(
+    spec = make_spec(tables, RULES, memory=memory, max_steps=8, **(LEARN | {"entropy_coef": 0.02}))
+    worker = make_worker(spec)
+    worker.env.world.starts = StartSampler(
         1, torch.tensor([start, start]), torch.tensor([0, 1]), torch.tensor([1, 1])
     )
     worker.env.begin(torch.ones(16, dtype=torch.bool))

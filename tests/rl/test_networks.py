@@ -1,11 +1,11 @@
 import torch
-from small_worlds import make_task, make_walks, make_worker, random_tables
+from small_worlds import make_spec, make_walks, make_worker, random_tables
 from tensordict import TensorDict
 from torchrl.modules import set_recurrent_mode
 
-from avn.rl.networks import ActorCritic, Shape, sample
+from avn.rl.networks import ActorCritic, NetworkSpec, sample
 
-SHAPE = Shape({"feature": 8, "sound_feature": 6}, actions=4, width=16, memory=5)
+SHAPE = NetworkSpec({"visual_embedding": 8, "audio_embedding": 6}, actions=4, width=16, memory=5)
 
 
 def observations(*batch: int) -> dict[str, torch.Tensor]:
@@ -22,16 +22,18 @@ def test_features_are_concatenated_and_a_missing_one_tells_nothing():
     weights = torch.cat([e.weight for e in network.encoders.values()], dim=1)
     first = torch.relu(torch.cat([*seen.values()], dim=1) @ weights.T + network.bias)
     assert torch.allclose(network.embed(seen), torch.relu(network.second(first)), atol=1e-6)
-    silent = network.embed(seen | {"sound_feature": torch.zeros(4, 6)})
-    assert torch.allclose(network.embed({"feature": seen["feature"]}), silent, atol=1e-6)
+    silent = network.embed(seen | {"audio_embedding": torch.zeros(4, 6)})
+    assert torch.allclose(
+        network.embed({"visual_embedding": seen["visual_embedding"]}), silent, atol=1e-6
+    )
 
 
 def test_standardised_features_have_no_mean_and_equal_spread():
     network = ActorCritic(SHAPE)
     examples = torch.randn(1000, 8) * torch.arange(1, 9) + 3
     examples[:, 0] = 5.0  # a part that never changes
-    network.standardise("feature", examples)
-    found = (examples - network.feature_mean) * network.feature_scale
+    network.standardise("visual_embedding", examples)
+    found = (examples - network.visual_embedding_mean) * network.visual_embedding_scale
     assert torch.allclose(found.mean(dim=0), torch.zeros(8), atol=1e-4)
     assert torch.allclose(found.std(dim=0)[1:], found.std(dim=0)[1].expand(7), rtol=1e-3)
     assert not found[:, 0].any()
@@ -67,7 +69,7 @@ def test_unrolling_is_torchrls_recurrent_mode_with_episodes_that_begin_anew():
 def test_memory_crosses_steps_and_is_renewed_where_an_episode_begins_and_only_there(flat, rules):
     tables = random_tables([flat], rules)
     walks = make_walks(tables)
-    worker = make_worker(make_task(tables, rules, walks=walks, memory=5, max_steps=4))
+    worker = make_worker(make_spec(tables, rules, walks=walks, memory=5, max_steps=4))
     batch = worker.collector.collect()
     after, before = batch["h_next"][:, :-1], batch["h"][:, 1:]
     begins = batch["is_init"][:, 1:, 0]
@@ -81,7 +83,7 @@ def test_memory_crosses_steps_and_is_renewed_where_an_episode_begins_and_only_th
 
 
 def test_memory_of_an_agent_without_walks_begins_empty(flat, rules):
-    worker = make_worker(make_task(random_tables([flat], rules), rules, memory=5, max_steps=4))
+    worker = make_worker(make_spec(random_tables([flat], rules), rules, memory=5, max_steps=4))
     batch = worker.collector.collect()
     begins = batch["is_init"][..., 0]
     assert not batch["h"][begins].any()
@@ -91,10 +93,10 @@ def test_memory_of_an_agent_without_walks_begins_empty(flat, rules):
 def test_the_memory_after_a_walk_is_that_of_its_pictures_in_silence(flat, rules):
     tables = random_tables([flat], rules)
     walks = make_walks(tables, walks=2, steps=7)
-    worker = make_worker(make_task(tables, rules, walks=walks, memory=5))
+    worker = make_worker(make_spec(tables, rules, walks=walks, memory=5))
     h, c = worker.network.no_memory(1)
     for state in walks[0, 1]:
-        seen = {"feature": tables.visual["feature"][state][None]}
+        seen = {"visual_embedding": tables.visual["visual_embedding"][state][None]}
         _, h, c = worker.network.remember(worker.network.embed(seen), h, c)
     assert torch.allclose(worker.explorations.h[1], h[0], atol=1e-6)
     assert torch.allclose(worker.explorations.c[1], c[0], atol=1e-6)

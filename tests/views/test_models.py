@@ -34,7 +34,6 @@ ROOM_KINDS = {
 
 def split(name: str) -> dict[str, list[FloorPlan]]:
     values = yaml.safe_load((CONF / f"{name}.yaml").read_text())
-    values.pop("defaults")
     return load_split(SplitConfig(**values))
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.acoustics import materials
+from avn.acoustics.direct_path import LOSS_TAPS, REGIMES, DirectPaths, find_paths, render_paths
 from avn.acoustics.dry_sounds import RATE
-from avn.acoustics.first_arrival import LOSS_TAPS, REGIMES, FirstArrivals, find_paths, render_paths
 from avn.acoustics.hrtf import load_sh_hrirs
 from avn.acoustics.rendering import Binaural, binaural_responses
 from avn.acoustics.tracer import Events, trace
@@ -26,32 +26,31 @@ class AcousticsConfig:
     """How the world sounds; the node `acoustics` of the config."""
 
     name: str = "resonance"  # of the regime, as files and tables have it
-    first_arrival: str = "through_walls"  # or round_corners
+    direct_path: str = "transmission"  # or diffraction
     seconds: float = 0.6  # length of the impulse responses
     rate: int = 16000  # Hz
     rays: int = 10000
     depth: int = 250  # reflections of a ray at most; time and loss end most of them before
     receiver_radius: float = 0.25  # metres
-    ear_height: float = 1.5  # metres
+    receiver_height: float = 1.5  # metres
     source_height: float = 1.0  # metres
     air: bool = True  # whether air absorbs
     seed: int = 0
 
 
 # What the names of the two regimes mean, wherever they stand.
-REGIME_OF = {"resonance": "through_walls", "diffraction": "round_corners"}
+REGIME_OF = {"resonance": "transmission", "diffraction": "diffraction"}
 
 
 def check_config(config: AcousticsConfig, node: str = "acoustics") -> AcousticsConfig:
     """The config itself, or a `UserError` that names the key below `node` and what it may be."""
-    if config.first_arrival not in REGIMES:
+    if config.direct_path not in REGIMES:
         raise UserError(
-            f"{node}.first_arrival: '{config.first_arrival}' is not known; "
-            f"use {' or '.join(REGIMES)}"
+            f"{node}.direct_path: '{config.direct_path}' is not known; use {' or '.join(REGIMES)}"
         )
-    if REGIME_OF.get(config.name, config.first_arrival) != config.first_arrival:
+    if REGIME_OF.get(config.name, config.direct_path) != config.direct_path:
         raise UserError(
-            f"{node}.first_arrival: '{config.first_arrival}' is not what the regime "
+            f"{node}.direct_path: '{config.direct_path}' is not what the regime "
             f"'{config.name}' means; give it a name of its own with {node}.name=mine"
         )
     limits: dict[str, tuple[float, float]] = {
@@ -60,7 +59,7 @@ def check_config(config: AcousticsConfig, node: str = "acoustics") -> AcousticsC
         "rays": (100, 10_000_000),
         "depth": (1, 100_000),
         "receiver_radius": (0.01, 2.0),
-        "ear_height": (0.1, 2.5),
+        "receiver_height": (0.1, 2.5),
         "source_height": (0.1, 2.5),
         "seed": (0, 2**62),
     }
@@ -166,28 +165,28 @@ def render_source(
     return Tail(samples, scale, cut_off_energy(events))
 
 
-def render_first_arrivals(
+def render_direct_paths(
     walls: NDArray[np.float64],
     source: NDArray[np.float64],
     listeners: NDArray[np.float64],
     config: AcousticsConfig,
-) -> FirstArrivals:
+) -> DirectPaths:
     """Render the first arrivals of one source at all listeners.
 
     Parameters
     ----------
     walls : array, shape (W, 4)
-        `avn.apartments.walls.walls(plan)`; what the sound goes round in `round_corners`.
+        `avn.apartments.walls.walls(plan)`; what the sound goes round in `diffraction`.
     source, listeners, config
         As in `render_source`.
     """
-    paths = find_paths(config.first_arrival, walls, source, listeners)
+    paths = find_paths(config.direct_path, walls, source, listeners)
     # One length in a regime, whether or not a source has listeners behind a wall.
-    loss_taps = LOSS_TAPS if config.first_arrival == "round_corners" else 1
+    loss_taps = LOSS_TAPS if config.direct_path == "diffraction" else 1
     return render_paths(paths, head_filters(config.rate), config.rate, loss_taps)
 
 
-def combine(tail: Tail, first: FirstArrivals) -> NDArray[np.float32]:
+def combine(tail: Tail, first: DirectPaths) -> NDArray[np.float32]:
     """The whole responses, shape (L, 4, 2, T), float32."""
     responses = tail.samples * tail.scale[:, None, None, None]
     length, taps = responses.shape[-1], first.samples.shape[-1]

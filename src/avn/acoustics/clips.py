@@ -21,10 +21,10 @@ from torch.nn.functional import pad
 
 from avn.acoustics.counter_hash import absorb, integers
 from avn.acoustics.dry_sounds import RATE
-from avn.acoustics.microphone import MicrophoneConfig, build_microphone
+from avn.acoustics.microphone import Microphone
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
-from avn.core.files import written_whole
+from avn.core.files import atomic_write
 
 CLIP_SAMPLES = RATE
 PURPOSES = ("train", "eval")
@@ -113,7 +113,7 @@ class ClipRenderer:
     ----------
     sounds : DrySounds
         The bank; clips are rendered on its device.
-    microphone : MicrophoneConfig
+    microphone : Microphone
         What it records with.
     seed : int
         Seed of all that is random.
@@ -122,17 +122,13 @@ class ClipRenderer:
 
     Raises
     ------
-    UserError
-        The microphone's config makes no sense.
     ValueError
         The purpose is another word.
     """
 
-    def __init__(
-        self, sounds: DrySounds, microphone: MicrophoneConfig, seed: int, purpose: str
-    ) -> None:
+    def __init__(self, sounds: DrySounds, microphone: Microphone, seed: int, purpose: str) -> None:
         self.sounds = sounds
-        self.microphone = build_microphone(microphone)
+        self.microphone = microphone
         device = sounds.keys.device
         words = torch.tensor([int(seed), PURPOSES.index(purpose)], device=device)
         self._key = absorb(torch.zeros((), dtype=torch.int64, device=device), words)
@@ -220,7 +216,7 @@ def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32]) -> None:
     samples = clip.detach().cpu().numpy() if isinstance(clip, Tensor) else np.asarray(clip)
     scaled = np.clip(EXPORT_FACTOR * samples.T, -1.0, 1.0)
     try:
-        with written_whole(target) as part:
+        with atomic_write(target) as part:
             soundfile.write(part, scaled, RATE, format="WAV", subtype="PCM_16")
     except (OSError, soundfile.SoundFileError) as error:
         reason = getattr(error, "strerror", None) or error

@@ -103,7 +103,7 @@ def straight_paths(source: NDArray[np.float64], listeners: NDArray[np.float64]) 
     return Paths(length, way / length[:, None], np.zeros(people), np.zeros(people, dtype=bool))
 
 
-def paths_round_corners(
+def diffracted_paths(
     walls: NDArray[np.float64], source: NDArray[np.float64], listeners: NDArray[np.float64]
 ) -> Paths:
     """The shortest ways from a source to listeners that pass through no wall.

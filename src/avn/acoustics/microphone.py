@@ -2,34 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import isfinite
 
 from torch import Tensor
 
-from avn.core.classes import import_class
 from avn.core.errors import UserError
-
-
-@dataclass
-class MicrophoneConfig:
-    """Config node `microphone`.
-
-    Attributes
-    ----------
-    noise_rms : float
-        RMS of each microphone's noise. Dry sounds have RMS 1, so the direct sound of a source at
-        1 m in front has 1 / sqrt(4 pi) = 0.28, which is 35 dB above the default; three rooms
-        away, some 24 dB weaker, sound still stands 11 dB above it.
-    gain : float
-        Factor on the sound at the microphone, before its noise.
-    """
-
-    noise_rms: float = 0.005
-    gain: float = 1.0
-    _target_: str = "avn.acoustics.microphone.Microphone"
 
 
 class Microphone:
@@ -39,8 +17,12 @@ class Microphone:
 
     Parameters
     ----------
-    noise_rms, gain : float
-        See `MicrophoneConfig`.
+    noise_rms : float
+        RMS of each microphone's noise. Dry sounds have RMS 1, so the direct sound of a source at
+        1 m in front has 1 / sqrt(4 pi) = 0.28, which is 35 dB above the default; three rooms
+        away, some 24 dB weaker, sound still stands 11 dB above it.
+    gain : float
+        Factor on the sound at the microphone, before its noise.
 
     Raises
     ------
@@ -75,10 +57,3 @@ class Microphone:
             for ear in range(2):
                 clips[:, ear].add_(noise(ear), alpha=self.noise_rms)
         return clips
-
-
-def build_microphone(config: MicrophoneConfig) -> Microphone:
-    """The microphone of a config; raises `UserError` where there is no such class."""
-    settings = {own.name: getattr(config, own.name) for own in dataclasses.fields(config)}
-    found: Microphone = import_class("microphone._target_", settings.pop("_target_"))(**settings)
-    return found

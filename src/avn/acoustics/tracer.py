@@ -4,7 +4,7 @@ Rays leave the source on a Fibonacci lattice, carry energy in six octave bands a
 like from a mirror or after Lambert's law, by the scattering of what they meet. Listeners are
 spheres; a ray that crosses one adds energy x chord / volume, which is the energy that flows through
 the place per unit of area (E / (4 pi D^2) for the direct sound). The direct sound itself is left
-out: `avn.acoustics.first_arrival` adds it exactly. `avn.acoustics.population` keeps about as many
+out: `avn.acoustics.direct_path` adds it exactly. `avn.acoustics.population` keeps about as many
 rays in every place.
 
 A ray has one direction for all bands. It is drawn by the mean scattering over the bands; at its

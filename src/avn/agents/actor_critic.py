@@ -9,38 +9,13 @@ import torch
 from tensordict import TensorDict
 from torch import Tensor
 
-from avn.agents.base import Agent, BaselineConfig
+from avn.agents.base import Agent
 from avn.core.errors import UserError
 from avn.mapping.ego_map import WIDTH, EgoMap, around, offsets
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.navigation.protocols import Protocol
-from avn.rl.explorations import explored, with_unknown_walk
+from avn.rl.exploration_memory import explored, with_unknown_walk
 from avn.rl.networks import ActorCritic, first_of
-
-
-@dataclass
-class ActorCriticConfig(BaselineConfig):
-    """Schema of `baseline=a3c`.
-
-    Attributes
-    ----------
-    width : int
-        Units of each layer of the trunk.
-    memory : int
-        Units of the LSTM; 0 for an agent that remembers nothing and does not explore.
-    map_width : int
-        Squares along each side of the part of the map that it sees, where there is a mapper.
-    top : int
-        Entries of the spatial memory that tell where it is on the map of its walk.
-    samples : bool
-        Whether it draws its actions, or takes the likeliest.
-    """
-
-    width: int = 128
-    memory: int = 0
-    map_width: int = WIDTH
-    top: int = 3
-    samples: bool = True
 
 
 class ActorCriticAgent(Agent):
@@ -54,15 +29,23 @@ class ActorCriticAgent(Agent):
     ----------
     network : ActorCritic or None
         None for an agent that is only asked what it wants.
-    memory, map_width, top, samples
-        See `ActorCriticConfig`.
+    width : int
+        Units of each layer of the trunk.
+    memory : int
+        Units of the LSTM; 0 for an agent that remembers nothing and does not explore.
+    map_width : int
+        Squares along each side of the part of the map that it sees, where there is a mapper.
+    top : int
+        Entries of the spatial memory that tell where it is on the map of its walk.
+    samples : bool
+        Whether it draws its actions, or takes the likeliest.
     hears, maps : bool
         Whether it hears, and whether it draws a map.
     map_size : int
         Squares along each side of its maps.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("feature",)
+    needs: ClassVar[tuple[str, ...]] = ("visual_embedding",)
 
     def __init__(
         self,
@@ -84,8 +67,8 @@ class ActorCriticAgent(Agent):
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
         """Features of what it sees, of what it hears, and windows for its map."""
-        heard = ("sound_feature",) if self.hears else ()
-        return (*self.needs, *heard, *(("window",) if self.maps else ()))
+        heard = ("audio_embedding",) if self.hears else ()
+        return (*self.needs, *heard, *(("local_patch",) if self.maps else ()))
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
         """Begin N new episodes, of which nothing is remembered."""
@@ -105,7 +88,7 @@ class ActorCriticAgent(Agent):
         ego = EgoMap(count, self.map_size, self.map_width) if self.maps else None
 
         def inputs(step: int) -> dict[str, Tensor]:
-            own = {"feature": walks["feature"][:, step]}
+            own = {"visual_embedding": walks["visual_embedding"][:, step]}
             if ego is not None:
                 own["map"] = with_unknown_walk(ego.observe(walks[:, step]))
             return own
@@ -113,7 +96,7 @@ class ActorCriticAgent(Agent):
         h, c = explored(self._trained(), inputs, count, steps)
         self._h, self._c = h[walk], c[walk]
         if ego is not None:
-            keys, values = distinct(walks["feature"], walks["odometry"])
+            keys, values = distinct(walks["visual_embedding"], walks["odometry"])
             memory = SpatialMemory(keys, values, walk, self.top)
             self._walked = OccupancyWalk(memory, ego.map.log_odds, walk, offsets(self.map_width))
 
@@ -178,5 +161,5 @@ class OccupancyWalk:
 
     def around(self, seen: dict[str, Tensor]) -> Tensor:
         """The map of each agent's walk around it, (N, width, width) float32."""
-        pose = locate(*self.memory.recall(seen["feature"], own=False)).round().long()
+        pose = locate(*self.memory.recall(seen["visual_embedding"], own=False)).round().long()
         return around(self.log_odds, self.walk, pose, self.squares)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import torch
@@ -14,13 +13,6 @@ from avn.navigation.protocols import Protocol
 
 if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator
-
-
-@dataclass
-class BaselineConfig:
-    """Schema of the config node `baseline`; a null target is no baseline."""
-
-    _target_: str | None = None
 
 
 class Agent(ABC):

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import torch
 from tensordict import TensorDict
 from torch import Tensor
 
-from avn.agents.base import Agent, BaselineConfig
+from avn.agents.base import Agent
 from avn.apartments.floor_plan import CELL
 from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT, STOP
 from avn.core.errors import UserError
 from avn.navigation.protocols import Protocol
-
-
-@dataclass
-class GreedyConfig(BaselineConfig):
-    """Schema of `baseline=greedy`; the fields mean what `Greedy` says."""
-
-    slack: float = 0.25
-    patience: int = 4
 
 
 class Greedy(Agent):
@@ -34,20 +24,22 @@ class Greedy(Agent):
     slack : float
         Metres. Where the protocol has Stop, it says so as soon as the source is heard at most that
         far beyond where Stop succeeds; half a cell by default, since what is heard lies on no grid.
-    patience : int
+    max_rotations : int
         Quarter turns in one place, after which it walks straight on: what is heard facing one way
         may contradict what is heard facing another, and it would turn for ever.
     """
 
-    needs = ("sound",)
+    needs = ("source_estimate",)
 
-    def __init__(self, slack: float = 0.25, patience: int = 4) -> None:
+    def __init__(self, slack: float = 0.25, max_rotations: int = 4) -> None:
         if not 0 <= slack <= 100:
             raise UserError(f"baseline.slack: {slack}; give metres, 0 or more")
-        if patience < 1:
-            raise UserError(f"baseline.patience: {patience} is less than 1, so it could not turn")
+        if max_rotations < 1:
+            raise UserError(
+                f"baseline.max_rotations: {max_rotations} is less than 1, so it could not turn"
+            )
         self.slack = slack
-        self.patience = patience
+        self.max_rotations = max_rotations
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
         """Begin N new episodes."""
@@ -56,17 +48,17 @@ class Greedy(Agent):
 
     def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
         """Where nobody says Stop, how far beyond the goal it would."""
-        return () if protocol.says_stop else ("slack",)
+        return () if protocol.requires_stop else ("slack",)
 
     def act(self, observation: TensorDict) -> Tensor:
         """One action for every episode, from the location heard now."""
-        right, front = observation["sound"].unbind(dim=-1)
+        right, front = observation["source_estimate"].unbind(dim=-1)
         ahead = (front > 0) & (front >= right.abs())
-        walks = ahead | (self.turns >= self.patience)
+        walks = ahead | (self.turns >= self.max_rotations)
         self.turns = torch.where(walks, 0, self.turns + 1)
         turn = torch.where(right < 0, ROTATE_LEFT, ROTATE_RIGHT)
         actions = torch.where(walks, FORWARD, turn)
-        if self.protocol.says_stop:
+        if self.protocol.requires_stop:
             actions = torch.where(self._within_reach(right, front), STOP, actions)
         return actions
 

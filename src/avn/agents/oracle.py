@@ -45,7 +45,7 @@ class Oracle(Agent):
         # A move that the allowance no longer holds is out; of equal costs the first action counts.
         costs = torch.where(left < 0, costs.max() + 1, costs)
         actions = (costs * STOP + torch.arange(STOP)).argmin(dim=1)
-        if self.protocol.says_stop:
+        if self.protocol.requires_stop:
             arrived = self._goal[simulator.source, simulator.state // HEADINGS]
             actions = torch.where(arrived, STOP, actions)
         return actions

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,37 +19,16 @@ from avn.mapping.base import Mapper
 from avn.navigation.protocols import Protocol
 from avn.planning.partial_graph import GraphRules
 from avn.planning.shortest_path import NO_ACTION, first_actions
-from avn.planning.source_search import HearingError, SourceSearch
+from avn.planning.source_belief import SourceBelief, SourceErrorModel
 
 if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator
 
 LOOKS = ("once", "around")
 # Parts in whose place it can be given the truth.
-TRUTH = ("location", "window", "map", "pose")
+ORACLE_INPUTS = ("source_estimate", "local_patch", "map", "pose")
 # A turn costs so little where it is free that it only decides between equal walks.
 _TIE = 0.01
-
-
-@dataclass
-class PlannerBase:
-    """What every option of the config group `planner` has; a null target is no planner."""
-
-    _target_: str | None = None
-    name: str = "none"
-
-
-@dataclass
-class PlannerConfig(PlannerBase):
-    """Schema of `planner=dijkstra`; the fields mean what `PlannerAgent` says."""
-
-    look: str = "once"
-    source: str = "newest"
-    blocked_below: float = 0.5
-    detour: float = 0.0
-    backward: bool = False
-    patience: int = 4
-    error: HearingError = field(default_factory=HearingError)
 
 
 class PlannerAgent(Agent):
@@ -66,73 +44,78 @@ class PlannerAgent(Agent):
     mapper : Mapper
     look : {"once", "around"}
         Whether it turns at each new place until it has observed all four headings there.
-    source : {"newest", "belief"}
+    source_filter : {"latest", "bayes"}
         Whether the newest estimate of the source counts alone, or all together.
     error : HearingError
-        How far estimates are trusted, for "belief".
-    blocked_below, detour : float
+        How far estimates are trusted, for "bayes".
+    obstacle_threshold, collision_cost : float
         See `GraphRules`.
     backward : bool
         Whether it may walk backward, where it sees nothing.
-    patience : int
+    max_rotations : int
         Quarter turns in one place after which it holds to the source as it heard it last until it
         has moved: what is heard facing one way may contradict what is heard facing another. After
         twice as many, and four more where it looks around, it walks straight on: where it takes
         itself to be may contradict itself too.
     stop_at : float
         Where the protocol has Stop, the probability of being within reach from which it says so.
-    truth : sequence of str
-        Parts in whose place it is given the truth, which makes it privileged: `location` of the
-        source and `window` come with the observations, `map` and `pose` go to the mapper.
+    oracle_inputs : sequence of str
+        Parts in whose place it is given the truth, which makes it privileged: `source_estimate` and
+        `local_patch` come with the observations, `map` and `pose` go to the mapper.
     """
 
     def __init__(
         self,
         mapper: Mapper,
         look: str = "once",
-        source: str = "newest",
-        error: HearingError | None = None,
-        blocked_below: float = 0.5,
-        detour: float = 0.0,
+        source_filter: str = "latest",
+        error: SourceErrorModel | None = None,
+        obstacle_threshold: float = 0.5,
+        collision_cost: float = 0.0,
         backward: bool = False,
-        patience: int = 4,
+        max_rotations: int = 4,
         stop_at: float = 0.5,
-        truth: Sequence[str] = (),
+        oracle_inputs: Sequence[str] = (),
     ) -> None:
-        for part in truth:
-            if part not in TRUTH:
-                raise UserError(f"agent.truth: '{part}' is none of {', '.join(TRUTH)}")
+        for part in oracle_inputs:
+            if part not in ORACLE_INPUTS:
+                raise UserError(
+                    f"agent.oracle_inputs: '{part}' is none of {', '.join(ORACLE_INPUTS)}"
+                )
             if part in ("map", "pose") and part not in mapper.reveals:
                 raise UserError(
-                    f"agent.truth: '{part}' is nothing that {type(mapper).__name__} can be shown"
+                    f"agent.oracle_inputs: '{part}' is nothing that {type(mapper).__name__} can be "
+                    "shown"
                 )
         if look not in LOOKS:
             raise UserError(f"look: '{look}' is none of {', '.join(LOOKS)}")
-        self.mapper, self.look, self.source = mapper, look, source
-        self.rules = GraphRules(blocked_below, detour)
-        self.error = error or HearingError()
-        if patience < 1:
-            raise UserError(f"planner.patience: {patience} is less than 1, so it could not turn")
-        self.backward, self.patience, self.stop_at = backward, patience, stop_at
-        self.truth, self.privileged = tuple(truth), bool(truth)  # type: ignore[misc]
+        self.mapper, self.look, self.source_filter = mapper, look, source_filter
+        self.rules = GraphRules(obstacle_threshold, collision_cost)
+        self.error = error or SourceErrorModel()
+        if max_rotations < 1:
+            raise UserError(
+                f"planner.max_rotations: {max_rotations} is less than 1, so it could not turn"
+            )
+        self.backward, self.max_rotations, self.stop_at = backward, max_rotations, stop_at
+        self.oracle_inputs, self.privileged = tuple(oracle_inputs), bool(oracle_inputs)  # type: ignore[misc]
         self.explores = mapper.explores
-        self.needs = ("sound", *mapper.needs)  # type: ignore[misc]
+        self.needs = ("source_estimate", *mapper.needs)  # type: ignore[misc]
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
         """What it has to observe; where it has to say Stop, whether it is within reach."""
-        return (*self.needs, "reach") if protocol.says_stop else self.needs
+        return (*self.needs, "stop_probability") if protocol.requires_stop else self.needs
 
     def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
         """Where the newest estimate counts alone, how far estimates are trusted."""
-        return ("error",) if self.source == "newest" else ()
+        return ("error",) if self.source_filter == "latest" else ()
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
         """Begin N new episodes."""
         super().reset(n, generator, protocol)
         self.mapper.reset(n, self.rules)
-        self._search: SourceSearch | None = None
+        self._search: SourceBelief | None = None
         # An episode without Stop ends in the cells round the source already.
-        self._near = 1 if protocol.goal == "box" and not protocol.says_stop else 0
+        self._near = 1 if protocol.goal == "box" and not protocol.requires_stop else 0
         self._running = np.ones(n, dtype=np.bool_)
         self._way = torch.full((n,), -1)
         self._turns = torch.zeros(n, dtype=torch.int64)
@@ -141,7 +124,7 @@ class PlannerAgent(Agent):
     def reveal(self, simulator: Simulator) -> None:
         """Show the mapper what it is given of the truth."""
         for part in ("map", "pose"):
-            if part in self.truth:
+            if part in self.oracle_inputs:
                 self.mapper.reveal(part, simulator)
 
     def explore(self, walks: TensorDict, walk: Tensor) -> None:
@@ -156,15 +139,15 @@ class PlannerAgent(Agent):
     def act(self, observation: TensorDict) -> Tensor:
         """One action for every episode, along the path planned now."""
         self.mapper.observe(observation, self._way)
-        self._listen(observation["sound"], self._running)
+        self._listen(observation["source_estimate"], self._running)
         actions = self._planned(self._running)
-        spins = self._turns >= 2 * self.patience
+        spins = self._turns >= 2 * self.max_rotations
         if self.look == "around":
             actions = torch.where(self._all_seen(), actions, ROTATE_RIGHT)
-            spins = self._turns >= 2 * self.patience + HEADINGS
+            spins = self._turns >= 2 * self.max_rotations + HEADINGS
         actions = torch.where(spins, FORWARD, actions)
-        if self.protocol.says_stop:
-            actions = torch.where(observation["reach"] >= self.stop_at, STOP, actions)
+        if self.protocol.requires_stop:
+            actions = torch.where(observation["stop_probability"] >= self.stop_at, STOP, actions)
         self._way = torch.where(actions == FORWARD, 0, torch.where(actions == BACKWARD, 2, -1))
         self._turns = torch.where(self._way >= 0, 0, self._turns + 1)
         return actions
@@ -173,12 +156,12 @@ class PlannerAgent(Agent):
         """Turn what is heard into places on the map."""
         pose, graph = self.mapper.pose, self.mapper.graph
         if self._search is None:
-            self._search = SourceSearch(self.n, graph.cost.shape[1], self.source, self.error)
+            self._search = SourceBelief(self.n, graph.cost.shape[1], self.source_filter, self.error)
         place, heard = pose[:, :2].numpy(), sound.double() / CELL
         aim = self.mapper.location + turned(heard, pose[:, 2])
         behind = turned(heard * heard.new_tensor((1.0, -1.0)), pose[:, 2])
         mirrored = self.mapper.location + behind
-        listens = running & (self._turns < self.patience).numpy()
+        listens = running & (self._turns < self.max_rotations).numpy()
         self._search.listen(place, aim.numpy(), mirrored.numpy(), listens)
         # Where no Stop is needed, an episode that goes on tells that none of the cells around
         # holds the source; where it is, that the place itself does not.

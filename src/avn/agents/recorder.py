@@ -16,7 +16,7 @@ from avn.apartments.floor_plan import CELL
 from avn.core.actions import HEADINGS
 from avn.core.pose import FRONT, RIGHT, turned
 from avn.mapping.base import Mapper
-from avn.navigation.simulator import Simulator, drawn_takes
+from avn.navigation.simulator import Simulator, drawn_realisations
 from avn.navigation.trace import Thoughts, Trace
 
 # Squares beyond the outermost cells that a picture of a belief still shows.
@@ -30,15 +30,17 @@ class Recorder:
     ----------
     rows : mapping of str to sequence of int
         By room, the places of the episodes in its batch.
-    takes : int
+    realisations : int
         How many takes of each clip there are.
     thoughts : bool
         Whether it also keeps what agents with maps took to be true.
     """
 
-    def __init__(self, rows: Mapping[str, Sequence[int]], takes: int, thoughts: bool) -> None:
+    def __init__(
+        self, rows: Mapping[str, Sequence[int]], realisations: int, thoughts: bool
+    ) -> None:
         self._rows = {room: torch.as_tensor(list(own)).long() for room, own in rows.items()}
-        self._takes, self._thinks = takes, thoughts
+        self._realisations, self._thinks = realisations, thoughts
         self._steps: dict[str, list[dict[str, Tensor]]] = {}
         self._rooms: dict[str, tuple[Simulator, bool]] = {}
         self._frames: dict[str, _Frames] = {}
@@ -54,7 +56,7 @@ class Recorder:
         if room not in self._rooms:
             self._rooms[room] = simulator, agent.explores
         step = {"state": simulator.state[rows], "collided": observation["collided"][rows]}
-        sound = observation.get("sound", None)
+        sound = observation.get("source_estimate", None)
         if sound is not None and sound.dim() == 2 and sound.shape[1] == 2:
             step["heard"] = sound[rows]
         if actions is not None:
@@ -103,7 +105,9 @@ class Recorder:
             thoughts = Thoughts(pose, self._frames[room].low, *own)
         draws = simulator.protocol.max_actions + 1
         # one episode's draws are asked for, so that a room with thousands costs no more
-        takes = drawn_takes(episodes, draws, self._takes, [row])[0, : count + 1]
+        realisations = drawn_realisations(episodes, draws, self._realisations, [row])[
+            0, : count + 1
+        ]
         return Trace(
             place=simulator.place,
             record=record,
@@ -112,7 +116,7 @@ class Recorder:
             state=state,
             action=np.asarray(told("action", count)),
             collided=np.asarray(told("collided", count + 1)),
-            take=takes.numpy().astype(np.int64),
+            realisation=realisations.numpy().astype(np.int64),
             heard=heard,
             thoughts=thoughts,
             walk=episodes.walks[episodes.walk[row]] if explores else None,

@@ -38,7 +38,7 @@ class Labels:
     look: str = "once"
 
 
-def walk_room(
+def rollout_scene(
     agent: Agent,
     place: Place,
     episodes: Episodes,
@@ -94,7 +94,7 @@ def walk(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> None
         if not len(episodes.walks):
             raise UserError(
                 f"episodes: agent {type(agent).__name__} explores first, and these episodes have "
-                "no exploration walk; take episodes=frozen and protocol.exploration=400"
+                "no exploration walk; take episodes=frozen and protocol.exploration_steps=400"
             )
         agent.explore(*simulator.explored())
     if agent.privileged:
@@ -118,7 +118,11 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
     end = simulator.state.numpy() // HEADINGS
     centres = place.grid.centres
     walked = CELL * simulator.walked.numpy().astype(np.float64)
-    path = walked if protocol.path == "walked" else simulator.attempted.numpy().astype(np.float64)
+    path = (
+        walked
+        if protocol.path_length == "metres"
+        else simulator.attempted.numpy().astype(np.float64)
+    )
     shortest, remaining = distances.shortest[source, start], distances.shortest[source, end]
     success, actions = simulator.success.numpy(), simulator.actions.numpy()
     fewest = _fewest(simulator)
@@ -129,7 +133,7 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
             "acoustics": labels.acoustics,
             "look": labels.look,
             "sound": np.array(episodes.sounds, dtype=object)[episodes.sound],
-            "room": place.name,
+            "scene": place.name,
             "seed": episodes.seed,
             "episode": episodes.number,
             "start_cell": start,
@@ -141,7 +145,7 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
             "geodesic": CELL * distances.source_moves[source, start],
             "euclidean": np.hypot(*(centres[start] - centres[np.asarray(place.sources)[source]]).T),
             "end_cell": end,
-            "path": path,
+            "path_length": path,
             "shortest": shortest,
             "actions": actions,
             "fewest_actions": fewest,
@@ -163,7 +167,7 @@ def _fewest(simulator: Simulator) -> np.ndarray:
     neighbours = simulator.place.grid.neighbours
     costs = fewest_actions(neighbours, distances.goal, int(allowance.max()))
     own = costs[allowance, episodes.source, episodes.start].astype(np.int64)
-    return own + int(simulator.protocol.says_stop)
+    return own + int(simulator.protocol.requires_stop)
 
 
 def _outcome(simulator: Simulator) -> np.ndarray:

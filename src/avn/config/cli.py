@@ -18,18 +18,15 @@ from pathlib import Path
 import hydra
 import yaml
 from hydra.core.hydra_config import HydraConfig
-from hydra.core.plugins import Plugins
-from hydra.errors import HydraException, OverrideParseException
+from hydra.errors import ConfigCompositionException, HydraException, OverrideParseException
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from avn.config import audio_source, schema, sweeps, user_configs
+from avn.config import audio_source, option_files, registry, renamed, spare, sweeps
 from avn.config.folder import conf_folder
 from avn.core.errors import UserError
 
-# Nodes of the config that have moved, and where to.
-MOVED = {"mapper.network": "occupancy_model"}
 # What is chosen for the training world, as Hydra spells it; apartments and acoustics follow the
 # test world until they are chosen.
 TRAINING = {
@@ -59,8 +56,7 @@ def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]],
 
 
 def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
-    schema.register()
-    _register_plugins()
+    registry.register()
     name = f"avn.{config_name}"
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises what it would print itself
     errors: list[Exception] = []
@@ -81,13 +77,11 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
     job.__module__ = name
     is_sweep = False
     try:
-        sys.argv = [sys.argv[0], *arrange(user_configs.take_folders(sys.argv[1:]))]
+        sys.argv = [sys.argv[0], *arrange(option_files.take_folders(sys.argv[1:]))]
         is_sweep = "--multirun" in sys.argv
         if is_sweep:
             sweeps.begin()
-        hydra.main(version_base="1.3", config_path=str(conf_folder()), config_name=config_name)(
-            job
-        )()
+        _compose_and_do(config_name, job)
         if errors:
             return _report(name, errors[0], explain(errors[0]))
         return sweeps.end(name) if is_sweep else 0
@@ -99,6 +93,21 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
     finally:
         if is_sweep:
             sweeps.forget()
+
+
+def _compose_and_do(config_name: str, job: Callable[[DictConfig], None]) -> None:
+    """Let Hydra compose the config and do the job; sets aside what the options do not have."""
+    spare.begin()
+    composed = hydra.main(
+        version_base="1.3", config_path=str(conf_folder()), config_name=config_name
+    )(job)
+    while True:
+        try:
+            composed()
+            return
+        except ConfigCompositionException as error:
+            if not spare.set_aside(sys.argv, error, everything=config_name == "reproduce"):
+                raise
 
 
 def plainly(name: str, task: Callable[[], None]) -> int:
@@ -136,10 +145,7 @@ def arrange(arguments: Iterable[str]) -> list[str]:
     groups = _groups()
     for argument in arguments:
         key, equals, value = argument.partition("=")
-        for old, new in MOVED.items():
-            if key.lstrip("+~").startswith(f"{old}."):
-                now = key.lstrip("+~").replace(old, new, 1)
-                raise UserError(f"{key}: is now {now}; give that")
+        renamed.check_name(key.lstrip("+~"))
         if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
             raise UserError(f"{argument}: name an option, such as 'none'; there are {groups[key]}")
         if argument in ("-m", "--multirun"):
@@ -224,8 +230,3 @@ def _one_line(text: str) -> str:
     text = re.sub(r"\s+\w*schema\b", "", text)  # the dataclasses stand among the options
     text = re.sub(r"\s*(full_key|object_type|reference_type)[:=]\s*\S*", "", text)
     return " ".join(text.split())
-
-
-def _register_plugins() -> None:
-    for plugin in (*audio_source.PLUGINS, *user_configs.PLUGINS):
-        Plugins.instance().register(plugin)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from hydra import compose
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
+from avn.config import spare
+from avn.config.spare import compose_fitting
 from avn.core.errors import UserError
 
 # Overrides that belong to this command and not to a row.
@@ -28,7 +29,7 @@ def compose_row(cfg: DictConfig, row: str) -> DictConfig:
         For a sound that the row's config does not have.
     """
     shared = [o for o in HydraConfig.get().overrides.task if o.split("=")[0] not in _OWN]
-    own = compose("eval", overrides=[*shared, f"agent={row}"])
+    own = compose_fitting("eval", [*shared, *spare.settings(), f"agent={row}"])
     for name in cfg.sounds:
         if name not in own.sound:
             raise UserError(f"sounds: '{name}' is none of {', '.join(own.sound)}")

@@ -10,9 +10,9 @@ from hydra.core.global_hydra import GlobalHydra
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from avn.config import schema
+from avn.config import registry, schema
 from avn.config.folder import conf_folder
-from avn.config.signatures import is_foreign, with_signature
+from avn.config.signatures import is_option, with_signature
 from avn.core.errors import UserError
 
 
@@ -39,7 +39,7 @@ def read_config(folder: Path) -> DictConfig:
 
 def _typed(plain: Any) -> DictConfig:
     """A config as it was composed, with the schema of each group; what is new has its default."""
-    schema.register()
+    registry.register()
     if GlobalHydra.instance().is_initialized():
         cfg = compose("eval")
     else:
@@ -54,28 +54,23 @@ def _typed(plain: Any) -> DictConfig:
 
 
 def _with_schema(group: str, node: DictConfig, default: DictConfig) -> DictConfig:
-    """A group's node with that of its schemas that fits it best: the fewest keys it has not."""
-    if is_foreign(group, node):
+    """A group's node with its schema."""
+    if is_option(group, node):
         return with_signature(group, node)
     if group == "training":
         return _training(node, default)
-    found = [schema for (own, _), schema in schema.SCHEMAS.items() if own == group]
-    nodes = [OmegaConf.structured(schema) for schema in found]
-    fitting = [own for own in nodes if set(map(str, node)) <= set(map(str, own))]
-    if not fitting:
-        if OmegaConf.get_type(default) is dict:  # of names and paths, which are the file's alone
-            return node
-        return OmegaConf.merge(default, node)  # type: ignore[return-value]
-    best = min(fitting, key=lambda own: (len(own), own._metadata.object_type.__name__))
-    return OmegaConf.merge(best, node)  # type: ignore[return-value]
+    if group in schema.SCHEMAS:
+        return OmegaConf.merge(OmegaConf.structured(schema.SCHEMAS[group]), node)  # type: ignore
+    if OmegaConf.get_type(default) is dict:  # of names and paths, which are the file's alone
+        return node
+    return OmegaConf.merge(default, node)  # type: ignore[return-value]
 
 
 def _training(node: DictConfig, default: DictConfig) -> DictConfig:
     """The node of the training world; its sounds are the file's alone."""
-    own = node.copy()
-    if is_foreign("microphone", own.get("microphone")):
-        own.microphone = with_signature("microphone", own.microphone)
-    sounds = own.pop("sounds", default.sounds)
-    merged = OmegaConf.merge(default, own)
-    OmegaConf.update(merged, "sounds", sounds, merge=False)
-    return merged  # type: ignore[return-value]
+    own, merged = node.copy(), default.copy()
+    for key in ("microphone", "sounds"):
+        value = own.pop(key, default[key])
+        typed = with_signature(key, value) if is_option(key, value) else value
+        OmegaConf.update(merged, key, typed, merge=False)
+    return OmegaConf.merge(merged, own)  # type: ignore[return-value]

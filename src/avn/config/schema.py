@@ -1,7 +1,7 @@
-"""What Hydra must know before it composes: the schema of each group.
+"""What Hydra must know before it composes: the schema of each command and of each group.
 
-Each group's node has a dataclass that stands beside the code it configures, so that a misspelt
-key or a wrong type is refused with its name.
+A misspelt key or a wrong type is refused with its name. The settings of a class stand in its
+signature, see `avn.config.signatures`; here is what the options of a group have in common.
 """
 
 from __future__ import annotations
@@ -9,31 +9,57 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from hydra.core.config_store import ConfigStore
 from omegaconf import II, MISSING
 
 from avn.acoustics.brir import AcousticsConfig
-from avn.acoustics.microphone import MicrophoneConfig
-from avn.agents.actor_critic import ActorCriticConfig
-from avn.agents.base import BaselineConfig
-from avn.agents.greedy import GreedyConfig
-from avn.agents.planner_agent import PlannerBase, PlannerConfig
 from avn.apartments.splits import SplitConfig
-from avn.mapping.config import MapperConfig, MemoryConfig
-from avn.modules.occupancy_cnn import OccupancyConfig
-from avn.modules.sound_cnn import SoundModelConfig
-from avn.modules.stop_classifier import StopModelConfig
-from avn.navigation.protocols import ProtocolConfig
-from avn.rl.config import A3CConfig
 from avn.views.backbone import BackboneConfig
-from avn.views.cycles import CyclesConfig
-from avn.views.raycast import RaycastConfig
 from avn.views.renderer import RendererConfig
 
-# Every recipe is trained with the one `train_seed`, unless it is given its own.
-_SEED: Any = II("train_seed")
 _TEST_SPLIT: Any = II("split")
 _TEST_ACOUSTICS: Any = II("acoustics")
+
+
+@dataclass
+class Option:
+    """What an option of any group has: the class that it is of, null for none.
+
+    Attributes
+    ----------
+    _target_ : str or None
+        Module and name of the class.
+    """
+
+    _target_: str | None = None
+
+
+@dataclass
+class NamedOption(Option):
+    """An option with a name, for titles and folders.
+
+    Attributes
+    ----------
+    name : str
+        What the option is called.
+    """
+
+    name: str = MISSING
+
+
+@dataclass
+class MapperOption(NamedOption):
+    """What every option of the group `mapper` has.
+
+    Attributes
+    ----------
+    size : int
+        Squares along each side of the map, odd.
+    visible_above : float
+        Squares that are visible with a lower probability tell nothing of being free.
+    """
+
+    size: int = 101
+    visible_above: float = 0.0
 
 
 @dataclass
@@ -47,12 +73,13 @@ class ModelConfig:
 class AgentConfig:
     """A row of the table; a privileged one is shown the truth and is a bound, not an entry.
 
-    `truth` names the parts in whose place it is given the truth: location, window, map, pose.
+    `oracle_inputs` names the parts in whose place it is given the truth: source_estimate,
+    local_patch, map, pose.
     """
 
     name: str = MISSING
     privileged: bool = False
-    truth: list[str] = field(default_factory=list)
+    oracle_inputs: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -64,7 +91,7 @@ class TrainingConfig:
 
     scenes: SplitConfig = _TEST_SPLIT
     acoustics: AcousticsConfig = _TEST_ACOUSTICS
-    microphone: MicrophoneConfig = MISSING
+    microphone: Option = MISSING
     sounds: dict[str, str] = MISSING
 
 
@@ -74,23 +101,23 @@ class CoreConfig:
 
     split: SplitConfig = MISSING
     acoustics: AcousticsConfig = MISSING
-    microphone: MicrophoneConfig = MISSING
+    microphone: Option = MISSING
     sound: dict[str, str] = MISSING
     training: TrainingConfig = field(default_factory=TrainingConfig)
-    sound_model: SoundModelConfig = MISSING
-    stop_model: StopModelConfig = MISSING
-    protocol: ProtocolConfig = MISSING
+    sound_model: NamedOption = MISSING
+    stop_model: NamedOption = MISSING
+    protocol: NamedOption = MISSING
     renderer: RendererConfig = MISSING
     backbone: BackboneConfig = MISSING
-    occupancy_model: OccupancyConfig = MISSING
-    mapper: MapperConfig = MISSING
-    planner: PlannerBase = MISSING
-    baseline: BaselineConfig = MISSING
-    a3c: A3CConfig = field(default_factory=lambda: A3CConfig(train_seed=_SEED))
+    occupancy_model: NamedOption = MISSING
+    mapper: MapperOption = MISSING
+    planner: NamedOption = MISSING
+    baseline: Option = MISSING
+    algorithm: Option = MISSING
     look: str = MISSING
     exploration: str = MISSING
     localisation: str = MISSING
-    takes: int = MISSING
+    realisations: int = MISSING
     train_seed: int = MISSING
     outputs: str = MISSING
     processes: int = MISSING
@@ -122,7 +149,7 @@ class EvalConfig(CoreConfig):
     agent: AgentConfig = MISSING
     seed: int = MISSING
     episodes: str = MISSING
-    part: str = MISSING
+    subset: str = MISSING
     # Films made of the run afterwards: how many, and of which episodes. They enter no hash.
     film: int = 0
     film_show: str = "typical"
@@ -138,60 +165,35 @@ class ReproduceConfig(CoreConfig):
     train_seeds: list[int] = MISSING
 
 
-# What every option of a group has. A class from outside the package adds its own parameters.
+# What every option of a group has.
 BASES: dict[str, type] = {
-    "sound_model": SoundModelConfig,
-    "stop_model": StopModelConfig,
-    "occupancy_model": OccupancyConfig,
-    "mapper": MapperConfig,
-    "planner": PlannerBase,
-    "baseline": BaselineConfig,
-    "protocol": ProtocolConfig,
-    "microphone": MicrophoneConfig,
+    "sound_model": NamedOption,
+    "stop_model": NamedOption,
+    "occupancy_model": NamedOption,
+    "mapper": MapperOption,
+    "planner": NamedOption,
+    "baseline": Option,
+    "protocol": NamedOption,
+    "algorithm": Option,
+    "microphone": Option,
     "renderer": RendererConfig,
     "backbone": BackboneConfig,
 }
 # Parameters that the pipeline gives, and no config.
 GIVEN = {
     "occupancy_model": ("camera",),
-    "planner": ("mapper", "truth", "stop_at"),
+    "planner": ("mapper", "oracle_inputs", "stop_at"),
     "baseline": ("network", "hears", "maps", "map_size"),
+    # of the part of a network that has this key
+    "net": ("channels", "height", "width", "outputs", "camera"),
 }
 # Parameters that follow the setting of the same name, unless they are given.
-LINKED = {"train_seed": _SEED, "look": II("look")}
+LINKED = {name: II(name) for name in ("train_seed", "look", "localisation")}
 COMMANDS = {
     "generate": GenerateConfig,
     "train": TrainConfig,
     "eval": EvalConfig,
     "reproduce": ReproduceConfig,
 }
-# The schema of each group that has one; `greedy_schema` and the like are of an option with its
-# own settings.
-SCHEMAS = {
-    ("split", "schema"): SplitConfig,
-    ("acoustics", "schema"): AcousticsConfig,
-    ("microphone", "schema"): MicrophoneConfig,
-    ("sound_model", "schema"): SoundModelConfig(train_seed=_SEED),
-    ("stop_model", "schema"): StopModelConfig(train_seed=_SEED),
-    ("protocol", "schema"): ProtocolConfig,
-    ("renderer", "schema"): RendererConfig,
-    ("renderer", "raycast_schema"): RaycastConfig,
-    ("renderer", "cycles_schema"): CyclesConfig,
-    ("backbone", "schema"): BackboneConfig,
-    ("occupancy_model", "schema"): OccupancyConfig(train_seed=_SEED),
-    ("mapper", "schema"): MapperConfig,
-    ("mapper", "memory_schema"): MemoryConfig,
-    ("planner", "schema"): PlannerConfig(look=II("look")),
-    ("baseline", "schema"): BaselineConfig,
-    ("baseline", "greedy_schema"): GreedyConfig,
-    ("baseline", "a3c_schema"): ActorCriticConfig,
-}
-
-
-def register() -> None:
-    """Store the schemas; may be called again."""
-    store = ConfigStore.instance()
-    for (group, name), schema in SCHEMAS.items():
-        store.store(group=group, name=name, node=schema)
-    for command, schema in COMMANDS.items():
-        store.store(name=f"{command}_schema", node=schema)
+# Groups whose options are values of one dataclass.
+SCHEMAS = {"split": SplitConfig, "acoustics": AcousticsConfig}

@@ -21,7 +21,7 @@ from omegaconf import DictConfig
 
 from avn.core.files import stage_folder
 from avn.core.hashing import digest
-from avn.core.progress import tell
+from avn.core.progress import log
 from avn.reporting.results import AVERAGE, across_seeds, read_csv, write_csv
 
 _RECORDS = "AVN_SWEEP_RECORDS"
@@ -69,7 +69,7 @@ def end(name: str) -> int:
         path = stage_folder(outputs, "eval", "sweeps/sweep", digest(done)) / "results.csv"
         write_csv(summary, path)
         if not failed:
-            tell(str(path.parent))
+            log(str(path.parent))
     for record in failed:
         print(f"{name}: failed: {record['overrides']}: {record['error']}", file=sys.stderr)
     if failed:
@@ -95,11 +95,11 @@ def _spread(records: list[dict[str, Any]]) -> pd.DataFrame:
 
 
 def _print(summary: pd.DataFrame) -> None:
-    for row in summary[summary["room"] == AVERAGE].to_dict("records"):
+    for row in summary[summary["scene"] == AVERAGE].to_dict("records"):
         figures = ", ".join(
             f"{figure.upper()} {100 * row[figure]:.1f}"
             + (f" +- {100 * row[figure + '_std']:.1f} %" if row["seeds"] > 1 else " %")
             for figure in ("sr", "spl")
         )
         labels = f"{row['agent']}, {row['sound']} ({row['setting'] or 'defaults'})"
-        tell(f"{labels}, {row['seeds']} seeds: {figures}")
+        log(f"{labels}, {row['seeds']} seeds: {figures}")

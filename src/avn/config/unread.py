@@ -10,6 +10,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
 from omegaconf import DictConfig
 
+from avn.config import spare
 from avn.core.errors import UserError
 from avn.core.settings import leaves, plain
 
@@ -33,6 +34,9 @@ def refuse_unread(command: str, cfg: DictConfig, read: Collection[str]) -> None:
     UserError
         Naming the override, and all settings that are read.
     """
+    for setting in spare.settings():
+        if (key := setting.split("=")[0]) not in read:
+            raise _unread(key, cfg, read)
     given = list(HydraConfig.get().overrides.task)
     suspects = [
         override
@@ -48,10 +52,14 @@ def refuse_unread(command: str, cfg: DictConfig, read: Collection[str]) -> None:
         here, there = leaves(cfg, [key]), leaves(default, [key])
         changed = {leaf for leaf in here | there if plain(cfg, leaf) != plain(default, leaf)}
         if changed and not changed & set(read):
-            raise UserError(
-                f"{key}: not read by this run, so that it would change nothing; the run reads "
-                f"{', '.join(summary(cfg, read))}"
-            )
+            raise _unread(key, cfg, read)
+
+
+def _unread(key: str, cfg: DictConfig, read: Collection[str]) -> UserError:
+    return UserError(
+        f"{key}: not read by this run, so that it would change nothing; the run reads "
+        f"{', '.join(summary(cfg, read))}"
+    )
 
 
 def _key(override: Override) -> str:

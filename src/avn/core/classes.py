@@ -1,9 +1,16 @@
-"""Classes by the name that a config gives them."""
+"""Classes by the name that a config gives them, their parameters, and objects built of them."""
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
+import inspect
+import typing
 from typing import Any
+
+from hydra.errors import InstantiationException
+from hydra.utils import instantiate
+from omegaconf import Container, DictConfig, OmegaConf
 
 from avn.core.errors import UserError
 
@@ -30,3 +37,108 @@ def import_class(option: str, target: str) -> Any:
         raise UserError(
             f"{option}: '{target}' cannot be had ({error}); is its folder on PYTHONPATH?"
         ) from error
+
+
+def parameters(cls: type) -> dict[str, tuple[Any, Any]]:
+    """Type and default of each parameter of a class, by name.
+
+    Parameters that `**` hands on to a base class are among them; where both have one, the class
+    itself counts. `inspect.Parameter.empty` stands for no default.
+    """
+    found: dict[str, tuple[Any, Any]] = {}
+    for owner in cls.__mro__:
+        if "__init__" not in vars(owner) or owner is object:
+            continue
+        # names in a dataclass's annotations are of the modules of its bases
+        data = dataclasses.is_dataclass(owner)
+        hints = _hints(owner if data else owner.__init__)  # type: ignore[misc]
+        own = list(inspect.signature(owner.__init__).parameters.values())[1:]  # type: ignore[misc]
+        for each in own:
+            if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY):
+                default = _made(owner, each.name) if data else each.default
+                found.setdefault(each.name, (hints.get(each.name), default))
+        if not any(each.kind is each.VAR_KEYWORD for each in own):
+            break
+    return found
+
+
+def _made(cls: Any, name: str) -> Any:
+    """The default of a dataclass's field."""
+    field = cls.__dataclass_fields__[name]
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+
+
+def _hints(function: Any) -> dict[str, Any]:
+    try:
+        return typing.get_type_hints(function)
+    except (NameError, TypeError):  # names that are imported for type checkers alone
+        return {}
+
+
+def build_object(option: str, node: DictConfig, **given: Any) -> Any:
+    """The object that a node of the config describes.
+
+    Keys that are no parameters of its class, such as the `name` of an option, are left out. Nodes
+    below it become objects of their own class, or plain dicts where the class builds them itself.
+
+    Parameters
+    ----------
+    option : str
+        The key of the node, for messages.
+    node : DictConfig
+        With `_target_`.
+    **given
+        Arguments that are in no config.
+
+    Raises
+    ------
+    UserError
+        Where there is no such class, or the class refuses a value.
+    """
+    target = str(node["_target_"])
+    cls = import_class(f"{option}._target_", target)
+    taken = parameters(cls)
+    settings = {key: _value(node[key], taken[key][0]) for key in map(str, node) if key in taken}
+    return cls(**(settings | given))
+
+
+def _value(value: Any, hint: Any) -> Any:
+    """A setting as its class takes it: nodes are dataclasses, or plain dicts where it takes those.
+
+    Networks take dicts, which a checkpoint can hold.
+    """
+    if not isinstance(value, Container):
+        return value
+    kinds = (hint, *typing.get_args(hint))
+    plain = any(kind is dict or typing.get_origin(kind) is dict for kind in kinds)
+    if isinstance(value, DictConfig) and not plain:
+        return OmegaConf.to_object(value)
+    return OmegaConf.to_container(value, resolve=True)
+
+
+def build_part(config: Any, node: str = "", **given: Any) -> Any:
+    """Build a part of a network from its config.
+
+    Parameters
+    ----------
+    config : config or dict
+        With `_target_`.
+    node : str
+        Where in the config the part stands, such as `sound_model`, if it does not say so itself.
+    **given
+        Further arguments.
+
+    Raises
+    ------
+    UserError
+        The one that the part raised, with the node before it if given.
+    """
+    try:
+        return instantiate(config, **given)
+    except InstantiationException as error:
+        if isinstance(error.__cause__, UserError):
+            where = f"{node}." if node else ""
+            raise UserError(f"{where}{error.__cause__}") from None
+        raise

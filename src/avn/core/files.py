@@ -10,7 +10,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from avn.core.errors import UserError
-from avn.core.progress import tell
+from avn.core.progress import log
 
 # Folders whose locks this process holds.
 _held: set[Path] = set()
@@ -44,7 +44,7 @@ def locked(folder: Path, what: str) -> Iterator[None]:
     try:
         lock.acquire(timeout=0)
     except Timeout:
-        tell(f"{what} is being made by another process: waiting for it")
+        log(f"{what} is being made by another process: waiting for it")
         lock.acquire()
     _held.add(folder)
     try:
@@ -55,7 +55,7 @@ def locked(folder: Path, what: str) -> Iterator[None]:
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Give a temporary path beside `path`, and rename it to `path` once the block has ended."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")

@@ -31,7 +31,7 @@ def threads_for_one_operation(count: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def made_ahead(make: Callable[[Part], Made], parts: Iterable[Part], threads: int) -> Iterator[Made]:
+def prefetch(make: Callable[[Part], Made], parts: Iterable[Part], threads: int) -> Iterator[Made]:
     """Give `make(part)` for each part in order, made in `threads` threads.
 
     Not more than two results a thread wait in memory. What the parts are is asked for in the
@@ -51,7 +51,7 @@ def made_ahead(make: Callable[[Part], Made], parts: Iterable[Part], threads: int
                 future.cancel()
 
 
-class AheadLoader(DataLoader[Any]):
+class PrefetchLoader(DataLoader[Any]):
     """A data loader whose dataset makes whole batches, ahead, in threads of this process.
 
     Threads share the impulse responses that lie in memory; processes would each load them.
@@ -70,4 +70,4 @@ class AheadLoader(DataLoader[Any]):
         self.threads = threads
 
     def __iter__(self) -> Iterator[Any]:  # type: ignore[override]
-        return made_ahead(self.dataset.__getitems__, self.batch_sampler, self.threads)  # type: ignore
+        return prefetch(self.dataset.__getitems__, self.batch_sampler, self.threads)  # type: ignore

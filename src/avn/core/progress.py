@@ -66,11 +66,11 @@ def progress_bar(what: str, total: int, unit: str) -> Iterator[Callable[[int], N
         yield lambda count: progress.advance(task, count)
 
 
-def tell(line: str) -> None:
+def log(line: str) -> None:
     """Print one line for the user, at once."""
     print(line, flush=True)
 
 
-def span(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """A length of time in words, such as `40 s` or `2.5 min`."""
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.1f} min"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import lightning as L
 import torch
@@ -12,15 +12,14 @@ from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
+from avn.core.classes import build_part
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
-from avn.core.prefetch import AheadLoader
+from avn.core.prefetch import PrefetchLoader
 from avn.dataset.scene import AudibleScene, Brirs, Scene
 from avn.dataset.source_locations import where_sources_are
-from avn.modules.listener import ClipBatch, PictureBatch
-from avn.modules.network import build_part
-from avn.modules.sound_cnn import SoundModelConfig
+from avn.modules.audio_network import ClipBatch, PictureBatch
 from avn.modules.spectrogram import Spectrogram
 
 # The clips on which networks in training are compared; the same for every `train_seed`.
@@ -61,7 +60,7 @@ class ClipSet(Dataset[ClipBatch]):
     ----------
     scenes : sequence of AudibleScene
     sounds : DrySounds
-    microphone : MicrophoneConfig
+    microphone : Microphone
     purpose : {"train", "eval"}
         Takes of the two purposes have nothing in common.
     seed : int
@@ -73,7 +72,7 @@ class ClipSet(Dataset[ClipBatch]):
         self,
         scenes: Sequence[AudibleScene],
         sounds: DrySounds,
-        microphone: MicrophoneConfig,
+        microphone: Microphone,
         purpose: str,
         seed: int,
         targets: Sequence[Tensor] | None = None,
@@ -98,9 +97,9 @@ class ClipSet(Dataset[ClipBatch]):
     def __len__(self) -> int:
         return self.pairs * len(self.sounds.names)
 
-    def item(self, pair: Tensor, sound: Tensor, take: int) -> Tensor:
+    def item(self, pair: Tensor, sound: Tensor, realisation: int) -> Tensor:
         """The number of a clip."""
-        return (take * self.pairs + pair) * len(self.sounds.names) + sound
+        return (realisation * self.pairs + pair) * len(self.sounds.names) + sound
 
     def __getitem__(self, item: int) -> ClipBatch:
         return self.__getitems__([item])
@@ -110,13 +109,13 @@ class ClipSet(Dataset[ClipBatch]):
         number = torch.as_tensor(items, dtype=torch.int64)
         sound = number % len(self.sounds.names)
         pair = number // len(self.sounds.names)
-        take, pair = pair // self.pairs, pair % self.pairs
+        realisation, pair = pair // self.pairs, pair % self.pairs
         # A pair that is heard with several sounds is transformed once.
         pair, index = pair.unique(return_inverse=True)
         spectra = brir_spectra(self._brirs(pair))
         source, state = self.source[pair][index], self.state[pair][index]
         return ClipBatch(
-            clips=self.renderer.render(spectra, ClipId(source, state, sound, take), index),
+            clips=self.renderer.render(spectra, ClipId(source, state, sound, realisation), index),
             target=self.target[pair][index],
             in_sight=self.in_sight[pair][index],
             sound=sound,
@@ -136,7 +135,7 @@ class ClipSet(Dataset[ClipBatch]):
         return brirs
 
 
-class FreshTakes(Sampler[int]):
+class ClipSampler(Sampler[int]):
     """The items of a training epoch in a random order: every pair, each time in another take.
 
     The order is drawn from the seed and the epoch alone, so that a resumed training sees what
@@ -209,8 +208,8 @@ class SoundData(L.LightningDataModule):
         Apartments of the two splits.
     sounds : DrySounds
         Training hears all of them.
-    microphone : MicrophoneConfig
-    recipe : SoundModelConfig
+    microphone : Microphone
+    recipe : Any
         Its `batch`, `train_seed`, `sounds_per_pair` and `validation_clips` are used.
 
     Attributes
@@ -232,8 +231,8 @@ class SoundData(L.LightningDataModule):
         train: Sequence[AudibleScene],
         validation: Sequence[AudibleScene],
         sounds: DrySounds,
-        microphone: MicrophoneConfig,
-        recipe: SoundModelConfig,
+        microphone: Microphone,
+        recipe: Any,
     ) -> None:
         super().__init__()
         if not train or not validation:
@@ -266,15 +265,15 @@ class SoundData(L.LightningDataModule):
         """What is to be heard of each source in each state of an apartment, (K, S, ...)."""
         return where_sources_are(scene)[0]
 
-    def train_dataloader(self) -> AheadLoader:
+    def train_dataloader(self) -> PrefetchLoader:
         """Every pair once an epoch (`sounds_per_pair` times), each time in a fresh take."""
         return self.loader(self.train_clips, self.train_sampler())
 
     def train_sampler(self) -> Sampler[int]:
         """The order of the training clips."""
-        return FreshTakes(self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair)
+        return ClipSampler(self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair)
 
-    def val_dataloader(self) -> list[AheadLoader]:
+    def val_dataloader(self) -> list[PrefetchLoader]:
         """Fixed clips of the validation and of the training apartments, in this order."""
         loaders = []
         for clips in self.measured_clips.values():
@@ -284,7 +283,7 @@ class SoundData(L.LightningDataModule):
             loaders.append(self.loader(clips, items.sort().values.tolist()))
         return loaders
 
-    def loader(self, clips: ClipSet, sampler: Sampler[int] | list[int]) -> AheadLoader:
+    def loader(self, clips: ClipSet, sampler: Sampler[int] | list[int]) -> PrefetchLoader:
         """Batches of pictures of some clips, in an order."""
         pictures = PictureSet(clips, self.spectrogram)
-        return AheadLoader(pictures, self.threads, batch_size=self.recipe.batch, sampler=sampler)
+        return PrefetchLoader(pictures, self.threads, batch_size=self.recipe.batch, sampler=sampler)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import torch
@@ -11,11 +12,10 @@ from torch import Tensor
 from torch.utils.data import Sampler
 
 from avn.acoustics.clips import DrySounds
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
 from avn.core.errors import UserError
 from avn.datamodules.sound import ClipSet, SoundData
 from avn.dataset.scene import AudibleScene, Scene
-from avn.modules.stop_classifier import StopModelConfig
 
 # Tells the cells of an apartment, (K, C) bool, at which each source counts as reached.
 GoalCells = Callable[[Scene], NDArray[np.bool_]]
@@ -47,7 +47,7 @@ class StopData(SoundData):
     ----------
     train, validation, sounds, microphone
         As `SoundData` takes them.
-    recipe : StopModelConfig
+    recipe : Any
         Its `positives` is the share of training clips that are heard at the goal.
     goal : callable
         Scene to (K, C) bool, the protocol's goal.
@@ -61,8 +61,8 @@ class StopData(SoundData):
         train: Sequence[AudibleScene],
         validation: Sequence[AudibleScene],
         sounds: DrySounds,
-        microphone: MicrophoneConfig,
-        recipe: StopModelConfig,
+        microphone: Microphone,
+        recipe: Any,
         goal: GoalCells,
     ) -> None:
         self.goal = goal
@@ -85,12 +85,12 @@ class StopData(SoundData):
 
     def train_sampler(self) -> Sampler[int]:
         """An epoch in which the share `positives` is heard at the goal."""
-        return GoalOften(
+        return GoalBalancedSampler(
             self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair, self.positives
         )
 
 
-class GoalOften(Sampler[int]):
+class GoalBalancedSampler(Sampler[int]):
     """The items of a training epoch in a random order, many of them at the goal.
 
     An epoch has as many clips as there are pairs, times `sounds_per_pair`. Pairs at the goal come
@@ -114,7 +114,7 @@ class GoalOften(Sampler[int]):
         self.positives = round(positives * self.count)
         groups = (self.positives, self.at_goal), (self.count - self.positives, self.elsewhere)
         # So many takes of a pair there are at most in one epoch.
-        self.takes = max(-(-count // len(pairs)) for count, pairs in groups)
+        self.realisations = max(-(-count // len(pairs)) for count, pairs in groups)
 
     def set_epoch(self, epoch: int) -> None:
         """Called by the trainer before each epoch."""
@@ -140,5 +140,5 @@ class GoalOften(Sampler[int]):
         pair = pairs[order[torch.arange(count) % len(pairs)]]
         names = len(self.clips.sounds.names)
         sound = torch.randint(names, (count,), generator=generator)
-        take = self.epoch * self.takes + rounds
-        return (take * self.clips.pairs + pair) * names + sound
+        realisation = self.epoch * self.realisations + rounds
+        return (realisation * self.clips.pairs + pair) * names + sound

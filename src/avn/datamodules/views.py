@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import lightning as L
 import numpy as np
@@ -13,8 +14,8 @@ from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
 from avn.core.errors import UserError
-from avn.core.prefetch import AheadLoader
-from avn.modules.occupancy_cnn import OccupancyConfig, ViewBatch
+from avn.core.prefetch import PrefetchLoader
+from avn.modules.occupancy_cnn import ViewBatch
 from avn.modules.view_augment import AugmentConfig, augment
 
 # The views on which networks in training are compared; the same for every `train_seed`.
@@ -131,7 +132,7 @@ def _mirror_some(batch: ViewBatch, chosen: Tensor) -> None:
         value[chosen] = value[chosen].flip(-1)
 
 
-class FreshViews(Sampler[int]):
+class ViewSampler(Sampler[int]):
     """The items of a training epoch: every view some times in a random order, each time anew.
 
     The order is drawn from the seed and the epoch alone.
@@ -166,7 +167,7 @@ class ViewData(L.LightningDataModule):
     ----------
     train, validation : sequence of Seen
         Apartments of the two splits.
-    recipe : OccupancyConfig
+    recipe : Any
         Its `batch`, `train_seed`, `times`, `validation_views`, `augment` and `mirror` are used.
 
     Raises
@@ -175,9 +176,7 @@ class ViewData(L.LightningDataModule):
         Where a split is empty.
     """
 
-    def __init__(
-        self, train: Sequence[Seen], validation: Sequence[Seen], recipe: OccupancyConfig
-    ) -> None:
+    def __init__(self, train: Sequence[Seen], validation: Sequence[Seen], recipe: Any) -> None:
         super().__init__()
         if not train or not validation:
             empty = "validation" if train else "train"
@@ -188,7 +187,7 @@ class ViewData(L.LightningDataModule):
         # Threads that make batches; the network learns in others.
         self.threads = 1
         seed = recipe.train_seed
-        self.train_views = ViewSet(train, seed, recipe.augment, recipe.mirror)
+        self.train_views = ViewSet(train, seed, recipe.augment, recipe.flip_augmentation)
         self.measured_views = {"validation": ViewSet(validation), "training": ViewSet(train)}
 
     @property
@@ -196,13 +195,13 @@ class ViewData(L.LightningDataModule):
         """How often each cell of the window is free in the training apartments, (5, 5)."""
         return self.train_views.free.mean(0)
 
-    def train_dataloader(self) -> AheadLoader:
+    def train_dataloader(self) -> PrefetchLoader:
         """Every view `times` times an epoch, changed anew each time."""
         recipe = self.recipe
-        sampler = FreshViews(len(self.train_views), recipe.train_seed, recipe.times)
+        sampler = ViewSampler(len(self.train_views), recipe.train_seed, recipe.times)
         return self._loader(self.train_views, sampler)
 
-    def val_dataloader(self) -> list[AheadLoader]:
+    def val_dataloader(self) -> list[PrefetchLoader]:
         """Some views of the validation and of the training apartments, as they are."""
         loaders = []
         for views in self.measured_views.values():
@@ -212,5 +211,5 @@ class ViewData(L.LightningDataModule):
             loaders.append(self._loader(views, items.tolist()))
         return loaders
 
-    def _loader(self, views: ViewSet, sampler: Sampler[int] | list[int]) -> AheadLoader:
-        return AheadLoader(views, self.threads, batch_size=self.recipe.batch, sampler=sampler)
+    def _loader(self, views: ViewSet, sampler: Sampler[int] | list[int]) -> PrefetchLoader:
+        return PrefetchLoader(views, self.threads, batch_size=self.recipe.batch, sampler=sampler)

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from avn.acoustics import brir
 from avn.acoustics.brir import AcousticsConfig
-from avn.acoustics.first_arrival import FirstArrivals
+from avn.acoustics.direct_path import DirectPaths
 from avn.acoustics.materials import NAMES
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import Grid, build_grid, source_cells
 from avn.apartments.surfaces import build_surfaces, line_of_sight
 from avn.apartments.walls import walls
 from avn.core.errors import UserError
-from avn.core.files import written_whole
+from avn.core.files import atomic_write
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene, scene_file
@@ -53,7 +53,7 @@ def build_geometry(
     """
     grid, sources = check_plan(plan)
     surfaces = build_surfaces(plan)
-    ears = _points(grid.centres, acoustics.ear_height)
+    ears = _points(grid.centres, acoustics.receiver_height)
     places = _points(grid.centres[sources], acoustics.source_height)
     pairs = (len(sources), grid.cells, 3)
     in_sight = line_of_sight(
@@ -116,17 +116,17 @@ def _points(centres: np.ndarray, height: float) -> np.ndarray:
 def _render_tail(job: _Job) -> int:
     surfaces = build_surfaces(job.plan)
     source = np.array([*job.source, job.acoustics.source_height])
-    ears = _points(job.cells, job.acoustics.ear_height)
+    ears = _points(job.cells, job.acoustics.receiver_height)
     tail = brir.render_source(surfaces, source, ears, job.acoustics)
-    with written_whole(job.part) as part, part.open("wb") as file:
+    with atomic_write(job.part) as part, part.open("wb") as file:
         np.savez(file, samples=tail.samples, scale=tail.scale, cut_db=tail.cut_db)
     return len(job.cells)
 
 
-def _render_first_arrivals(job: _Job) -> FirstArrivals:
+def _render_direct_paths(job: _Job) -> DirectPaths:
     source = np.array([*job.source, job.acoustics.source_height])
-    ears = _points(job.cells, job.acoustics.ear_height)
-    return brir.render_first_arrivals(walls(job.plan), source, ears, job.acoustics)
+    ears = _points(job.cells, job.acoustics.receiver_height)
+    return brir.render_direct_paths(walls(job.plan), source, ears, job.acoustics)
 
 
 def build_reverberation(
@@ -197,7 +197,7 @@ def build_direct_sound(
     fingerprint : str
         What tells this file from others; it is written into it.
     """
-    arrivals = [_render_first_arrivals(job) for job in _jobs(which, acoustics, path)]
+    arrivals = [_render_direct_paths(job) for job in _jobs(which, acoustics, path)]
 
     def fill(file: h5py.File) -> None:
         file["samples"] = np.stack([a.samples for a in arrivals])

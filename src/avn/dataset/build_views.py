@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid
-from avn.core.files import written_whole
+from avn.core.files import atomic_write
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene_file
@@ -135,7 +135,7 @@ def _open(job: _Lighting, light: Prepared | None = None) -> Renderer:
 
 def _light(job: _Lighting) -> int:
     renderer = _open(job)
-    with written_whole(job.file) as part, part.open("wb") as file:
+    with atomic_write(job.file) as part, part.open("wb") as file:
         np.savez(file, **renderer.prepare())  # type: ignore[arg-type]
     return 1
 
@@ -156,7 +156,7 @@ def _renderer(job: _Lighting) -> Renderer:
 def _render(job: _Rendering) -> int:
     states = np.arange(job.first, job.last)
     rgb, depth = _renderer(job.lighting).views(job.centres[states // 4], states % 4)
-    with written_whole(job.file) as part, part.open("wb") as file:
+    with atomic_write(job.file) as part, part.open("wb") as file:
         np.savez(file, rgb=rgb, depth=depth)
     return len(states)
 

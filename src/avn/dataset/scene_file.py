@@ -17,7 +17,7 @@ from typing import Any
 import h5py
 
 from avn.core.errors import UserError
-from avn.core.files import written_whole
+from avn.core.files import atomic_write
 
 _BLOCK = 512
 _CHUNK = 1 << 24
@@ -41,7 +41,7 @@ def write(
     fill : callable
         Writes the datasets into the open file.
     """
-    with written_whole(path) as part:
+    with atomic_write(path) as part:
         with h5py.File(part, "w", userblock_size=_BLOCK, libver="v110") as file:
             file.attrs["kind"] = kind
             file.attrs["version"] = version

@@ -14,23 +14,22 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
-from hydra.utils import instantiate
 from numpy.typing import NDArray
 from torch import Tensor
 
-from avn.config import schema
+from avn.config import registry
 from avn.config.folder import conf_folder
+from avn.core.classes import build_object
 from avn.core.errors import UserError
-from avn.core.settings import typed
+from avn.navigation.batched_episodes import BatchedEpisodes
 from avn.navigation.protocols import Protocol
-from avn.navigation.starts import build_starts
-from avn.navigation.tables import Tables
-from avn.navigation.world import World
+from avn.navigation.scene_batch import SceneBatch
+from avn.navigation.start_sampler import build_start_sampler
 from avn.pipeline import policy
 from avn.pipeline.occupancy import sees_windows
 from avn.pipeline.sound_network import hears
 from avn.pipeline.stage import build
-from avn.rl.config import A3CConfig, check_recipe
+from avn.rl.algorithm import Algorithm
 from avn.rl.environment import WalkEnv
 
 Observation = dict[str, NDArray[Any]]
@@ -47,7 +46,7 @@ class WalkGym(gymnasium.Env[Observation, int]):
         See `avn.rl.environment.WalkEnv`.
     """
 
-    def __init__(self, world: World, observes: Sequence[str]) -> None:
+    def __init__(self, world: BatchedEpisodes, observes: Sequence[str]) -> None:
         self.metadata = {"render_modes": []}
         self._env = WalkEnv(world, observes)
         self.observation_space: spaces.Space[Any] = _space(self._env)
@@ -76,7 +75,7 @@ class WalkGym(gymnasium.Env[Observation, int]):
 class WalkVector(VectorEnv[Observation, NDArray[Any], NDArray[Any]]):
     """N agents that walk at once; an episode that ends begins anew in the same step."""
 
-    def __init__(self, world: World, observes: Sequence[str]) -> None:
+    def __init__(self, world: BatchedEpisodes, observes: Sequence[str]) -> None:
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
         self._env, self.num_envs = WalkEnv(world, observes), world.n
         self.single_observation_space = _space(self._env)
@@ -148,17 +147,19 @@ def _world(
     n: int,
     observes: Sequence[str] | None,
     max_steps: int | None,
-) -> tuple[World, Sequence[str]]:
+) -> tuple[BatchedEpisodes, Sequence[str]]:
     tables, default, protocol, recipe = _tables(overrides, part)
-    starts = build_starts(tables)
-    world = World(tables, starts, n, protocol, max_steps, recipe.reward, recipe.train_seed)
+    starts = build_start_sampler(tables)
+    world = BatchedEpisodes(
+        tables, starts, n, protocol, max_steps, recipe.reward, recipe.train_seed
+    )
     return world, observes or default
 
 
 @lru_cache(maxsize=4)
 def _tables(
     overrides: tuple[str, ...], part: str
-) -> tuple[Tables, tuple[str, ...], Protocol, A3CConfig]:
+) -> tuple[SceneBatch, tuple[str, ...], Protocol, Algorithm]:
     # many environments of one process look into the same tables
     cfg = _config(overrides)
     if part not in policy.PARTS:
@@ -166,14 +167,14 @@ def _tables(
     for stage in policy.part_stages(cfg, part):
         build(stage)
     tables = policy.tables_of(cfg, policy.load_part(cfg, part))
-    heard = ("sound_feature",) if hears(cfg) else ()
-    names = ("feature", *heard, *(("map",) if sees_windows(cfg) else ()))
-    return tables, names, instantiate(cfg.protocol), check_recipe(typed(cfg.a3c))
+    heard = ("audio_embedding",) if hears(cfg) else ()
+    names = ("visual_embedding", *heard, *(("map",) if sees_windows(cfg) else ()))
+    return tables, names, build_object("protocol", cfg.protocol), policy.build_algorithm(cfg)
 
 
 def _config(overrides: tuple[str, ...]) -> Any:
     """The config of `avn.train`, also from within a command of Hydra."""
-    schema.register()
+    registry.register()
     chosen = [*([] if any(o.startswith("model=") for o in overrides) else ["model=a3c_va"])]
     if GlobalHydra.instance().is_initialized():
         return compose("train", overrides=[*chosen, *overrides])
@@ -182,7 +183,7 @@ def _config(overrides: tuple[str, ...]) -> Any:
 
 
 def _arrays(env: WalkEnv) -> Observation:
-    seen = env.look()
+    seen = env.observation()
     shown = env.features(seen["state"], seen["clip"])
     shown |= {name: seen[name] for name in env.observes if name in seen}
     return {name: _array(shown[name]) for name in env.observes}

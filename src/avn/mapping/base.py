@@ -89,7 +89,9 @@ class Mapper(ABC):
         UserError
             Where this mapper has no use for it.
         """
-        raise UserError(f"agent.truth: '{part}' is nothing that {type(self).__name__} can be shown")
+        raise UserError(
+            f"agent.oracle_inputs: '{part}' is nothing that {type(self).__name__} can be shown"
+        )
 
     def rest(self, done: Tensor) -> None:
         """Be told which agents' episodes are over, (N,) bool, to save the work for them."""

@@ -64,7 +64,7 @@ class EgoMap:
         Parameters
         ----------
         observation : TensorDict of batch size (N,)
-            `odometry`, `collided` and `window`.
+            `odometry`, `collided` and `local_patch`.
         actions : (N,) int64 tensor, optional
             The last actions, without which collisions tell nothing.
 

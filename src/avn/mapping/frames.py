@@ -9,7 +9,7 @@ from avn.core.actions import HEADINGS
 from avn.core.pose import turned
 
 
-class FrameVotes:
+class FrameAligner:
     """Votes of N agents for where the frame of their start lies in that of their walk.
 
     A place p with heading h since the start lies at R(turn) p + shift, with heading h + turn, in
@@ -73,7 +73,7 @@ class FrameVotes:
         """Let the frames lie where they are told to, (N, 2) and (N,), whatever is voted."""
         self._votes.scatter_(1, self._index(turn, shift)[:, None], torch.inf)
 
-    def refuse(self, rows: Tensor) -> Tensor:
+    def reject(self, rows: Tensor) -> Tensor:
         """Take the winner of some agents out for ever; gives the same rows, where they had one."""
         chosen = rows & (self._winner >= 0)
         at = chosen.nonzero()[:, 0]

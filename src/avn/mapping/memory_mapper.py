@@ -12,7 +12,7 @@ from avn.core.actions import HEADINGS
 from avn.core.errors import UserError
 from avn.core.pose import turned
 from avn.mapping.base import Mapper
-from avn.mapping.frames import FrameVotes, turned_walls
+from avn.mapping.frames import FrameAligner, turned_walls
 from avn.mapping.occupancy_map import CERTAIN, OccupancyMap
 from avn.mapping.occupancy_mapper import take_in
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
@@ -39,7 +39,7 @@ class MemoryMapper(Mapper):
     top : int
         Entries that an estimate of the place is made of.
     localisation : {"retrieval", "retrieval+odometry"}
-    windows : bool
+    local_patches : bool
         Whether the map also takes in which squares look free, in the walk and later.
     edges : {"consecutive", "adjacent"}
         Whether squares of the walk are joined where the walk went from one to the other, or
@@ -57,7 +57,7 @@ class MemoryMapper(Mapper):
         size: int = 101,
         top: int = 3,
         localisation: str = "retrieval+odometry",
-        windows: bool = False,
+        local_patches: bool = False,
         edges: str = "consecutive",
         sharpness: float = 0.02,
         confidence: float = 0.5,
@@ -71,8 +71,8 @@ class MemoryMapper(Mapper):
         self.size, self.top, self.localisation = size, top, localisation
         self.in_walk = localisation == "retrieval"
         self.edges, self.sharpness, self.confidence = edges, sharpness, confidence
-        self.windows = windows
-        self.needs = ("feature", "window") if windows else ("feature",)  # type: ignore[misc]
+        self.local_patches = local_patches
+        self.needs = ("visual_embedding", "local_patch") if local_patches else ("visual_embedding",)  # type: ignore[misc]
         self.reveals = () if self.in_walk else ("pose",)  # type: ignore[misc]
 
     def unused_settings(self) -> tuple[str, ...]:
@@ -90,7 +90,7 @@ class MemoryMapper(Mapper):
 
     def explore(self, walks: TensorDict, walk: Tensor) -> None:
         """Remember the walks: pictures, visited squares and the edges between them."""
-        keys, values = distinct(walks["feature"], walks["odometry"])
+        keys, values = distinct(walks["visual_embedding"], walks["odometry"])
         self._memory = SpatialMemory(keys, values, walk, self.top)
         self._known = self._walked(walks)
         self._walk = walk
@@ -101,14 +101,14 @@ class MemoryMapper(Mapper):
             every = torch.arange(self.size**2).expand(len(walk), -1)
             self.graph.set(every, self.map.belief.flatten(1))
         else:
-            self._votes = FrameVotes(len(walk), self.size, self.sharpness)
-            self._laid = torch.zeros_like(self.map.log_odds)
-            self._laid_walls = torch.zeros_like(self.map.walls)
+            self._votes = FrameAligner(len(walk), self.size, self.sharpness)
+            self._overlaid = torch.zeros_like(self.map.log_odds)
+            self._overlaid_walls = torch.zeros_like(self.map.walls)
 
     def belief(self, rows: Tensor) -> Tensor:
         """What each square is believed to be, (R, M, M): own map and walk together."""
         own = self.map.log_odds[rows]
-        return torch.sigmoid(own if self.in_walk else self._both(own, self._laid[rows]))
+        return torch.sigmoid(own if self.in_walk else self._both(own, self._overlaid[rows]))
 
     def reveal(self, part: str, simulator: Simulator) -> None:
         """Take in where the walk truly lies in the frame of the start."""
@@ -129,7 +129,7 @@ class MemoryMapper(Mapper):
         if self._memory is None:
             raise UserError(
                 "mapper: the spatial memory has no entry, for nothing was explored; "
-                "take episodes=frozen and protocol.exploration=400"
+                "take episodes=frozen and protocol.exploration_steps=400"
             )
         if self.localisation == "retrieval":
             self._observe_by_looks(self._memory, observation, way)
@@ -139,36 +139,38 @@ class MemoryMapper(Mapper):
     def _observe_by_looks(
         self, memory: SpatialMemory, observation: TensorDict, way: Tensor
     ) -> None:
-        similarity, places = self.retrieved = memory.recall(observation["feature"])
+        similarity, places = self.retrieved = memory.recall(observation["visual_embedding"])
         found = locate(similarity, places)
         pose = found.round().long()
-        squares = take_in(self.map, pose, self._last, observation, way, self.windows)
+        squares = take_in(self.map, pose, self._last, observation, way, self.local_patches)
         self.graph.set(squares, torch.sigmoid(self.map.log_odds.flatten(1).gather(1, squares)))
-        memory.add(observation["feature"], pose, similarity[:, 0] < 1 - 1e-4)
+        memory.add(observation["visual_embedding"], pose, similarity[:, 0] < 1 - 1e-4)
         self._place(pose, found[:, :2])
 
     def _observe_by_votes(
         self, memory: SpatialMemory, observation: TensorDict, way: Tensor
     ) -> None:
         pose = observation["odometry"]
-        squares = take_in(self.map, pose, self._last, observation, way, self.windows)
-        similarity, places = self.retrieved = memory.recall(observation["feature"], own=False)
+        squares = take_in(self.map, pose, self._last, observation, way, self.local_patches)
+        similarity, places = self.retrieved = memory.recall(
+            observation["visual_embedding"], own=False
+        )
         awake = self._awake
         changed = self._votes.vote(pose, similarity, places, self.confidence, awake)
         if len(awake) == len(pose):
-            own, laid = self.map.log_odds, self._laid
+            own, overlaid = self.map.log_odds, self._overlaid
         else:
-            own, laid = self.map.log_odds[awake], self._laid[awake]
+            own, overlaid = self.map.log_odds[awake], self._overlaid[awake]
         wrong = torch.zeros(len(pose), dtype=torch.bool)
-        wrong[awake] = ((own <= -CERTAIN) & (laid >= CERTAIN)).flatten(1).any(dim=1)
-        changed |= self._votes.refuse(wrong)
+        wrong[awake] = ((own <= -CERTAIN) & (overlaid >= CERTAIN)).flatten(1).any(dim=1)
+        changed |= self._votes.reject(wrong)
         rows = changed.nonzero()[:, 0]
         if len(rows):
             self._lay(rows)
             every = torch.arange(self.size**2).expand(len(rows), -1)
             self._set(rows, every)
         self._set(torch.arange(len(pose)), squares)
-        self.graph.walls = (self.map.walls | self._laid_walls).numpy()
+        self.graph.walls = (self.map.walls | self._overlaid_walls).numpy()
         self._place(pose, pose[:, :2].double())
 
     def _place(self, pose: Tensor, location: Tensor) -> None:
@@ -180,12 +182,12 @@ class MemoryMapper(Mapper):
     def _set(self, rows: Tensor, squares: Tensor) -> None:
         """Give squares of some agents the cost of what walk and own map say together."""
         own = self.map.log_odds.flatten(1)[rows[:, None], squares]
-        laid = self._laid.flatten(1)[rows[:, None], squares]
-        self.graph.set(squares, torch.sigmoid(self._both(own, laid)), rows)
+        overlaid = self._overlaid.flatten(1)[rows[:, None], squares]
+        self.graph.set(squares, torch.sigmoid(self._both(own, overlaid)), rows)
 
     @staticmethod
-    def _both(own: Tensor, laid: Tensor) -> Tensor:
-        return torch.where(own.abs() >= CERTAIN, own, own + laid)
+    def _both(own: Tensor, overlaid: Tensor) -> Tensor:
+        return torch.where(own.abs() >= CERTAIN, own, own + overlaid)
 
     def _lay(self, rows: Tensor) -> None:
         """Lay what the walk knows over the maps of some agents, where they take it to lie."""
@@ -200,8 +202,8 @@ class MemoryMapper(Mapper):
         odds = torch.where(inside, self._known.log_odds.flatten(1)[walk, index], 0.0)
         walls = torch.where(inside, self._known.walls.flatten(1)[walk, index], 0)
         shape = (len(rows), self.size, self.size)
-        self._laid[rows] = odds.reshape(shape)
-        self._laid_walls[rows] = turned_walls(walls, turn).reshape(shape)
+        self._overlaid[rows] = odds.reshape(shape)
+        self._overlaid_walls[rows] = turned_walls(walls, turn).reshape(shape)
 
     def _walked(self, walks: TensorDict) -> OccupancyMap:
         """What each walk knows of the squares round its start."""
@@ -212,8 +214,8 @@ class MemoryMapper(Mapper):
         for step in range(steps):
             pose = walks["odometry"][:, step]
             here = known.stand(pose)
-            if self.windows:
-                known.see(pose, walks["window"][:, step])
+            if self.local_patches:
+                known.see(pose, walks["local_patch"][:, step])
             moved = (pose[:, :2] != before[:, :2]).any(dim=1)
             joined[own, known.flat(before[:, :2]), pose[:, 2]] |= moved  # it only walks forward
             joined[own, here, (pose[:, 2] + 2) % HEADINGS] |= moved

@@ -110,7 +110,7 @@ class OccupancyMap:
         ----------
         pose : (N, 3) int64 tensor
             Right, front and heading.
-        window : (N, 5, 5) float tensor
+        local_patch : (N, 5, 5) float tensor
             Probability that each square is free; NaN tells nothing.
 
         Returns

@@ -27,7 +27,7 @@ class OccupancyMapper(Mapper):
         Squares along each side of the map, odd.
     """
 
-    needs = ("window",)
+    needs = ("local_patch",)
     reveals = ("map",)
 
     def __init__(self, size: int = 101) -> None:
@@ -85,7 +85,7 @@ def take_in(
     pose, last : (N, 3) int64 tensors
         Where the agents are now, and where they were before the last action.
     observation : TensorDict
-        `collided`, and `window` where it sees.
+        `collided`, and `local_patch` where it sees.
     way : (N,) int64 tensor
         See `Mapper.observe`.
     sees : bool
@@ -100,5 +100,5 @@ def take_in(
     bumped = beliefs.bump(last, (last[:, 2] + way) % 4, observation["collided"] & (way >= 0))
     squares = torch.stack((stood, bumped), dim=1)
     if sees:
-        squares = torch.cat((squares, beliefs.see(pose, observation["window"])), dim=1)
+        squares = torch.cat((squares, beliefs.see(pose, observation["local_patch"])), dim=1)
     return squares

@@ -98,7 +98,8 @@ class SpatialMemory:
             likeness = torch.cat((likeness, added.masked_fill(empty, -torch.inf)), dim=1)
         if not likeness.shape[1] or bool(likeness.amax(dim=1).isinf().any()):
             raise UserError(
-                "mapper: the spatial memory has no entry; explore first (protocol.exploration=400)"
+                "mapper: the spatial memory has no entry; explore first "
+                "(protocol.exploration_steps=400)"
             )
         similarity, entry = likeness.topk(min(self.top, likeness.shape[1]), dim=1)
         places = self._values[self.walk[:, None], entry.clamp(max=size - 1)]

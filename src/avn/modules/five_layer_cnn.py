@@ -3,24 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 from torch import Tensor, nn
 
 from avn.core.errors import UserError
-
-
-@dataclass
-class NetConfig:
-    """The sizes of a `FiveLayerCnn`; see there."""
-
-    _target_: str = "avn.modules.five_layer_cnn.FiveLayerCnn"
-    widths: list[int] = field(default_factory=lambda: [16, 32, 64, 128, 128])
-    hidden: list[int] = field(default_factory=lambda: [128])
-    pool: str = "stride"
-    tanh: bool = False
-    dropout: float = 0.25
-    reach: float = 10.0
 
 
 class FiveLayerCnn(nn.Module):
@@ -41,10 +27,10 @@ class FiveLayerCnn(nn.Module):
     pool : {"stride", "max"}
         Halving by a convolution of stride 2, or by max-pooling after one of stride 1.
     tanh : bool
-        Whether tanh bounds the output to +-`reach`.
+        Whether tanh bounds the output to +-`output_scale`.
     dropout : float
         Share of inputs of each dense layer that training silences.
-    reach : float
+    output_scale : float
         Factor on the outputs; for locations, metres.
     outputs : int
     """
@@ -59,14 +45,14 @@ class FiveLayerCnn(nn.Module):
         pool: str = "stride",
         tanh: bool = False,
         dropout: float = 0.25,
-        reach: float = 10.0,
+        output_scale: float = 10.0,
         outputs: int = 2,
     ) -> None:
         super().__init__()
         if min([*widths, *hidden], default=1) < 1:
             raise UserError("net: widths and hidden are 1 or more each")
-        if not (0 <= dropout < 1 and reach > 0):
-            raise UserError("net: dropout is 0 to 1 and reach over 0 metres")
+        if not (0 <= dropout < 1 and output_scale > 0):
+            raise UserError("net: dropout is 0 to 1 and output_scale over 0")
         if pool not in ("stride", "max"):
             raise UserError(f"net.pool is '{pool}'; give stride or max")
         if min(height, width) < 2 ** len(widths) and pool == "max":
@@ -74,7 +60,7 @@ class FiveLayerCnn(nn.Module):
                 f"spectrogram: {height} x {width} is too small for {len(widths)} "
                 "halvings; raise bands and frames"
             )
-        self.reach = reach
+        self.output_scale = output_scale
         layers: list[nn.Module] = [nn.BatchNorm2d(channels)]
         for before, after in zip((channels, *widths), widths, strict=False):
             stride = 2 if pool == "stride" else 1
@@ -95,7 +81,7 @@ class FiveLayerCnn(nn.Module):
 
     def forward(self, pictures: Tensor) -> Tensor:
         """(N, channels, height, width) pictures to (N, outputs)."""
-        return self.layers(pictures) * self.reach
+        return self.layers(pictures) * self.output_scale
 
     def hidden(self, pictures: Tensor) -> Tensor:
         """What the last dense layer is given, (N, `hidden_size`)."""
@@ -103,4 +89,4 @@ class FiveLayerCnn(nn.Module):
 
     def answer(self, hidden: Tensor) -> Tensor:
         """What `forward` gives, (N, outputs), from what `hidden` gave."""
-        return self.layers[self._answer :](hidden) * self.reach
+        return self.layers[self._answer :](hidden) * self.output_scale

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,51 +10,43 @@ from typing import Any, ClassVar
 
 import lightning as L
 import torch
-from hydra.errors import InstantiationException
-from hydra.utils import instantiate
 from lightning.pytorch.utilities.types import OptimizerLRSchedulerConfig
 from torch import nn
 from torch.optim.lr_scheduler import LambdaLR
 
+from avn.core.classes import build_part
 from avn.core.errors import UserError
 
 # The two sets of apartments on which a network in training is measured, in this order.
 SPLITS = ("validation", "training")
 
 
+# The config of a part that a network builds: `_target_` and arguments of that class.
+Part = dict[str, Any]
+
+
 @dataclass
 class OptimizerConfig:
-    """The optimiser and its rate; any class of torch.optim that takes these two."""
+    """Optimiser of a network: any class of torch.optim that takes these two.
+
+    Attributes
+    ----------
+    _target_ : str
+        Module and name of the class.
+    lr : float
+        Learning rate.
+    weight_decay : float
+        Weight decay.
+    """
 
     _target_: str = "torch.optim.AdamW"
     lr: float = 2e-3
     weight_decay: float = 1e-2
 
 
-def build_part(config: Any, node: str = "", **given: Any) -> Any:
-    """Build a part of a network from its config.
-
-    Parameters
-    ----------
-    config : config or dict
-        With `_target_`.
-    node : str
-        Where in the config the part stands, such as `sound_model`, if it does not say so itself.
-    **given
-        Further arguments.
-
-    Raises
-    ------
-    UserError
-        The one that the part raised, with the node before it if given.
-    """
-    try:
-        return instantiate(config, **given)
-    except InstantiationException as error:
-        if isinstance(error.__cause__, UserError):
-            where = f"{node}." if node else ""
-            raise UserError(f"{where}{error.__cause__}") from None
-        raise
+def as_part(config: Any) -> Part:
+    """A config as a plain dict, which a checkpoint can hold."""
+    return config if isinstance(config, dict) else dataclasses.asdict(config)
 
 
 class Network(L.LightningModule):

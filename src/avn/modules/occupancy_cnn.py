@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any, TypedDict
 
 import torch
-from omegaconf import MISSING
 from torch import Tensor, nn
 from torchmetrics import MeanMetric
 
 from avn.core.errors import UserError
-from avn.modules.network import SPLITS, Network, OptimizerConfig
+from avn.modules.network import SPLITS, Network, OptimizerConfig, Part, as_part
 from avn.modules.view_augment import AugmentConfig
 from avn.modules.window_metrics import WindowScores, calibrated, calibration
-from avn.modules.window_net import WindowNetConfig
 from avn.views.camera import CameraConfig
 
 
@@ -31,33 +28,7 @@ class ViewBatch(TypedDict):
     inverse_depth: Tensor
 
 
-@dataclass
-class OccupancyConfig:
-    """What sees the cells ahead, with the recipe that trains it."""
-
-    _target_: str | None = "avn.modules.occupancy_cnn.OccupancyCnn"
-    # The parts arrive as plain dicts: a checkpoint can hold them, and `weights_only=True` reads it.
-    _recursive_: bool = False
-    _convert_: str = "all"
-    name: str = MISSING
-    net: WindowNetConfig = field(default_factory=WindowNetConfig)
-    optimizer: OptimizerConfig = field(
-        default_factory=lambda: OptimizerConfig(lr=3e-3, weight_decay=5e-2)
-    )
-    augment: AugmentConfig = field(default_factory=AugmentConfig)
-    schedule: str = "cosine"
-    epochs: int = 5
-    patience: int = 5
-    batch: int = 32
-    looks: int = 2
-    times: int = 4
-    validation_views: int = 500
-    mirror: bool = True
-    symmetric: bool = True
-    visible_only: bool = False
-    depth_weight: float = 1.0
-    scaled: bool = True
-    train_seed: int = 0
+WINDOW_NET: Part = {"_target_": "avn.modules.window_net.WindowNet"}
 
 
 class OccupancyCnn(Network):
@@ -73,16 +44,16 @@ class OccupancyCnn(Network):
         An `AugmentConfig` as a plain dict, read by the data module.
     schedule, epochs, patience, batch, train_seed
         As those of `avn.modules.sound_cnn.SoundCnn`.
-    looks : int
+    appearances : int
         In how many looks (furniture models, patterns, light) training apartments are shown; read
         by the data module.
     times : int
         How often a view is shown in an epoch, changed anew each time; read by the data module.
     validation_views : int
         On how many views of each split it is measured after each epoch; read by the data module.
-    mirror : bool
+    flip_augmentation : bool
         Shows half of the training views mirrored, which is exact: so is the camera.
-    symmetric : bool
+    flip_tta : bool
         Estimates as the mean over a view and its mirror image, mirrored back.
     visible_only : bool
         Whether only cells that can be seen are learned. If so, what it says of others is nothing
@@ -105,18 +76,18 @@ class OccupancyCnn(Network):
     def __init__(
         self,
         name: str,
-        net: dict[str, Any],
-        optimizer: dict[str, Any],
-        augment: dict[str, Any] | None = None,
+        net: Part = WINDOW_NET,
+        optimizer: OptimizerConfig | Part | None = None,
+        augment: AugmentConfig | Part | None = None,
         schedule: str = "cosine",
         epochs: int = 5,
         patience: int = 5,
         batch: int = 32,
-        looks: int = 2,
+        appearances: int = 2,
         times: int = 4,
         validation_views: int = 500,
-        mirror: bool = True,
-        symmetric: bool = True,
+        flip_augmentation: bool = True,
+        flip_tta: bool = True,
         visible_only: bool = False,
         depth_weight: float = 1.0,
         scaled: bool = True,
@@ -124,14 +95,16 @@ class OccupancyCnn(Network):
         camera: dict[str, Any] | None = None,
     ) -> None:
         super().__init__()
+        optimizer = as_part(optimizer or OptimizerConfig())
+        augment = as_part(augment or AugmentConfig())
         self.save_hyperparameters()
         self.check_recipe()
-        for key in ("looks", "times", "validation_views"):
+        for key in ("appearances", "times", "validation_views"):
             if self.hparams[key] < 1:
                 raise UserError(f"{self.node}.{key} is {self.hparams[key]}; give at least 1")
         if depth_weight < 0:
             raise UserError(f"{self.node}.depth_weight is {depth_weight}; give 0 or more")
-        self.symmetric, self.visible_only = symmetric, visible_only
+        self.flip_tta, self.visible_only = flip_tta, visible_only
         if visible_only:
             self.monitor = "loss/validation/visible"  # type: ignore[misc]
         self.depth_weight, self.scaled = depth_weight, scaled
@@ -159,7 +132,7 @@ class OccupancyCnn(Network):
 
     def log_odds(self, pictures: Tensor) -> Tensor:
         """(N, 3, H, W) pictures, 0 to 1, to (N, 2, 5, 5) log-odds before calibration."""
-        if not self.symmetric or self.training:
+        if not self.flip_tta or self.training:
             return self._net(pictures)[0]
         straight, mirrored = self._net(torch.cat((pictures, pictures.flip(-1))))[0].chunk(2)
         return (straight + mirrored.flip(-1)) / 2

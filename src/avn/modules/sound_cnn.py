@@ -3,71 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import torch
-from omegaconf import MISSING
 from torch import Tensor, nn
 from torchmetrics import MeanSquaredError
 
 from avn.core.errors import UserError
-from avn.modules.five_layer_cnn import FiveLayerCnn, NetConfig
-from avn.modules.listener import Listener, PictureBatch
-from avn.modules.network import SPLITS, OptimizerConfig
+from avn.modules.audio_network import AudioNetwork, PictureBatch
+from avn.modules.five_layer_cnn import FiveLayerCnn
+from avn.modules.network import SPLITS
 from avn.modules.sound_metrics import LocationErrors
-from avn.modules.spectrogram import SpectrogramConfig
 
 
-@dataclass
-class SoundModelConfig:
-    """What hears, with the recipe that trains it: one node of the config, `sound_model`."""
-
-    _target_: str = "avn.modules.sound_cnn.SoundCnn"
-    # The parts arrive as plain dicts: a checkpoint can hold them, and `weights_only=True` reads it.
-    _recursive_: bool = False
-    _convert_: str = "all"
-    name: str = MISSING
-    spectrogram: SpectrogramConfig = field(default_factory=SpectrogramConfig)
-    net: NetConfig = field(default_factory=NetConfig)
-    optimizer: OptimizerConfig = field(default_factory=OptimizerConfig)
-    schedule: str = "cosine"
-    epochs: int = 15
-    patience: int = 6
-    batch: int = 64
-    mirror: bool = True
-    symmetric: bool = True
-    train_seed: int = 0
-    sounds_per_pair: int = 1
-    validation_clips: int = 2000
-
-
-def no_sound_model(**_: Any) -> None:
-    """What the option `none` of the group builds: nothing, so that no agent hears."""
-
-
-class SoundCnn(Listener):
-    """Spectrogram, network and the recipe that trains them.
+class SoundCnn(AudioNetwork):
+    """Sound network: estimates where the source of a clip is.
 
     Parameters
     ----------
-    name : str
-        The option of the config group.
-    spectrogram, net, optimizer : dict
-        Configs with `_target_`, as plain dicts.
-    schedule : {"cosine", "constant"}
-        Learning rate over the epochs; "cosine" warms up over the first tenth and falls to 0.
-    epochs, patience : int
-        Length of the training, and after how many epochs without progress it stops early.
-    mirror : bool
-        Shows half of the training clips with ears and locations mirrored, which is exact: the
-        head is symmetric and so is the world.
-    symmetric : bool
-        Estimates as the mean over a clip and its mirror image, mirrored back.
-    train_seed : int
-        Draws the weights and all that is random in training.
-    batch, sounds_per_pair, validation_clips : int
-        Read by the data module; kept here so that the checkpoint knows its whole recipe.
+    **recipe
+        Those of `AudioNetwork`.
     """
 
     node = "sound_model"
@@ -77,25 +32,8 @@ class SoundCnn(Listener):
     # A source on the right is on the left once the ears are exchanged.
     mirror_signs = (-1.0, 1.0)
 
-    def __init__(
-        self,
-        name: str,
-        spectrogram: dict[str, Any],
-        net: dict[str, Any],
-        optimizer: dict[str, Any],
-        schedule: str = "cosine",
-        epochs: int = 15,
-        patience: int = 6,
-        batch: int = 64,
-        mirror: bool = True,
-        symmetric: bool = True,
-        train_seed: int = 0,
-        sounds_per_pair: int = 1,
-        validation_clips: int = 2000,
-    ) -> None:
-        super().__init__()
-        self.save_hyperparameters()
-        self.build_ears()
+    def __init__(self, **recipe: Any) -> None:
+        super().__init__(**recipe)
         self.training_loss = MeanSquaredError()
         # Plain lists: they take what is already on the CPU and are no part of a checkpoint.
         self.losses = [MeanSquaredError() for _ in SPLITS]
@@ -148,7 +86,7 @@ class SoundCnn(Listener):
 
     def training_step(self, batch: PictureBatch, index: int) -> Tensor:
         """The mean square error in square metres, with half of the clips mirrored."""
-        pictures, target = self.half_mirrored(batch["pictures"], batch["target"])
+        pictures, target = self.random_flip(batch["pictures"], batch["target"])
         estimate = self._net(pictures)
         loss = nn.functional.mse_loss(estimate, target)
         self.training_loss(estimate.detach().flatten(), target.flatten())

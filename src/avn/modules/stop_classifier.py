@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import torch
@@ -12,27 +11,14 @@ from torch import Tensor, nn
 from torchmetrics import MeanMetric
 
 from avn.core.errors import UserError
-from avn.modules.five_layer_cnn import NetConfig
-from avn.modules.listener import Listener, PictureBatch
-from avn.modules.network import SPLITS
-from avn.modules.sound_cnn import SoundModelConfig
+from avn.modules.audio_network import FIVE_LAYERS, AudioNetwork, PictureBatch
+from avn.modules.network import SPLITS, Part
 from avn.modules.stop_metrics import CRITERIA, StopScores
 
-
-@dataclass
-class StopModelConfig(SoundModelConfig):
-    """What says Stop, with the recipe that trains it: one node of the config, `stop_model`."""
-
-    _target_: str = "avn.modules.stop_classifier.StopClassifier"
-    net: NetConfig = field(default_factory=lambda: NetConfig(reach=1.0))
-    epochs: int = 7
-    validation_clips: int = 2000
-    positives: float = 0.25
-    criterion: str = "approach"
-    threshold: float | None = None
+ONE_SCORE: Part = {**FIVE_LAYERS, "output_scale": 1.0}
 
 
-class StopClassifier(Listener):
+class StopClassifier(AudioNetwork):
     """Spectrogram, network with one output and the recipe that trains them.
 
     The goal is a few cells of many, so clips at the goal are shown more often in training than
@@ -42,14 +28,19 @@ class StopClassifier(Listener):
 
     Parameters
     ----------
-    name, spectrogram, net, optimizer, schedule, epochs, patience, batch, mirror, symmetric, \
-train_seed, sounds_per_pair, validation_clips
-        As those of `avn.modules.sound_cnn.SoundCnn`.
+    net : dict
+        Config of the network, with `_target_`.
+    epochs : int
+        Length of the training.
     positives : float
         Share of training clips at the goal.
-    criterion, threshold : str, float or None
-        How the threshold is chosen on the validation apartments, or the threshold itself; no part
-        of the recipe, for the network is the same.
+    criterion : str
+        How the threshold is chosen on the validation apartments; no part of the recipe, for the
+        network is the same.
+    threshold : float or None
+        The threshold itself; null chooses it by the criterion.
+    **recipe
+        Those of `avn.modules.audio_network.AudioNetwork`.
     """
 
     log_odds_shift: Tensor
@@ -61,29 +52,17 @@ train_seed, sounds_per_pair, validation_clips
 
     def __init__(
         self,
-        name: str,
-        spectrogram: dict[str, Any],
-        net: dict[str, Any],
-        optimizer: dict[str, Any],
-        schedule: str = "cosine",
+        net: Part = ONE_SCORE,
         epochs: int = 7,
-        patience: int = 6,
-        batch: int = 64,
-        mirror: bool = True,
-        symmetric: bool = True,
-        train_seed: int = 0,
-        sounds_per_pair: int = 1,
-        validation_clips: int = 2000,
         positives: float = 0.25,
         criterion: str = "approach",
         threshold: float | None = None,
+        **recipe: Any,
     ) -> None:
-        super().__init__()
-        self.save_hyperparameters(ignore=["criterion", "threshold"])
+        super().__init__(net=net, epochs=epochs, **recipe)
         if not 0 < positives < 1:
             raise UserError(f"stop_model.positives is {positives}; give more than 0, less than 1")
         check_decision(criterion, threshold)
-        self.build_ears()
         self.register_buffer("log_odds_shift", torch.zeros(()))
         self.training_loss = MeanMetric()
         # Plain lists: they take what is already on the CPU and are no part of a checkpoint.
@@ -122,7 +101,7 @@ train_seed, sounds_per_pair, validation_clips
     def training_step(self, batch: PictureBatch, index: int) -> Tensor:
         """The cross-entropy, with half of the clips mirrored."""
         at_goal = (batch["target"] == 0).float()[:, None]
-        pictures, at_goal = self.half_mirrored(batch["pictures"], at_goal)
+        pictures, at_goal = self.random_flip(batch["pictures"], at_goal)
         loss = nn.functional.binary_cross_entropy_with_logits(self._net(pictures), at_goal)
         self.training_loss.update(loss.detach(), len(at_goal))
         return loss
@@ -160,10 +139,6 @@ def check_decision(criterion: str, threshold: float | None) -> None:
         raise UserError(f"stop_model.criterion: '{criterion}' is none of {known}")
     if threshold is not None and not 0 <= threshold <= 1:
         raise UserError(f"stop_model.threshold: {threshold}; give 0 to 1, or null to choose one")
-
-
-def no_stop_model(**_: Any) -> None:
-    """What the option `none` of the group builds: nothing, so that no agent has it."""
 
 
 def _log_odds(probability: float) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -27,17 +26,6 @@ PROBES = (
     (0.0, 0.0, 1.3),
 )
 OUTPUTS = 2
-
-
-@dataclass
-class WindowNetConfig:
-    """The sizes of a `WindowNet`; see there."""
-
-    _target_: str = "avn.modules.window_net.WindowNet"
-    widths: list[int] = field(default_factory=lambda: [16, 32, 64, 96])
-    decoder: int = 32
-    cell: int = 64
-    dropout: float = 0.1
 
 
 def probe_places(camera: CameraConfig) -> tuple[Tensor, Tensor]:

@@ -47,7 +47,7 @@ def measure(place: Place, protocol: Protocol) -> Distances:
     grid, sources = place.grid, np.asarray(place.sources)
     goal = protocol.goal_cells(grid, sources)
     source_moves = grid.distances[sources].astype(np.int64)
-    if protocol.path == "walked":
+    if protocol.path_length == "metres":
         allowance = source_moves
         shortest = CELL * source_moves.astype(np.float64)
     else:

@@ -64,7 +64,7 @@ def frozen_episodes(
     seed: int,
     exploration: str = "shared",
 ) -> Episodes:
-    """The frozen list of a room: `protocol.starts` episodes for each source and sound.
+    """The frozen list of a room: `protocol.num_starts` episodes for each source and sound.
 
     Starts are drawn uniformly, without repeats, from the states that are neither at the goal nor
     on the exploration walk. The list is a function of the seed, the room's name and its grid: all
@@ -85,12 +85,12 @@ def frozen_episodes(
     Raises
     ------
     UserError
-        Where the room has fewer starts than `protocol.starts` for one of its sources.
+        Where the room has fewer starts than `protocol.num_starts` for one of its sources.
     """
     if exploration not in EXPLORATIONS:
         raise UserError(f"exploration: '{exploration}' is none of {', '.join(EXPLORATIONS)}")
     grid, sources = place.grid, np.asarray(place.sources)
-    cells, wanted = len(grid.lattice), protocol.starts
+    cells, wanted = len(grid.lattice), protocol.num_starts
     goal = protocol.goal_cells(grid, sources)
     _check_enough(place.name, ~goal, wanted)
     source = np.repeat(np.arange(len(sources)), wanted)
@@ -100,17 +100,19 @@ def frozen_episodes(
     keys = _source_keys("starts", seed, place)
     order = np.argsort(scramble(keys[:, None], states[None, :]), axis=1, kind="stable")
     walk_key = np.uint64(derive("exploration", seed, place.name))
-    if not protocol.exploration:
+    if not protocol.exploration_steps:
         walks, walk = np.empty((0, 1), dtype=np.int64), np.full(len(source), -1)
         starts = _first_allowed(order, ~goal, wanted)
     elif exploration == "shared":
-        shared, left = shared_walk(grid.neighbours, ~goal, walk_key, protocol.exploration, wanted)
+        shared, left = shared_walk(
+            grid.neighbours, ~goal, walk_key, protocol.exploration_steps, wanted
+        )
         walks, walk = shared[None], np.zeros(len(source), dtype=np.int64)
         starts = _first_allowed(order, left, wanted)
     else:
         each = np.arange(len(source))
         walks, left = own_walks(
-            grid.neighbours, ~goal[source], scramble(walk_key, each), protocol.exploration
+            grid.neighbours, ~goal[source], scramble(walk_key, each), protocol.exploration_steps
         )
         walk, turned = each, (np.arange(wanted)[:, None] + states) % len(states)
         # every start of a source looks through the same order from another place on
@@ -146,7 +148,7 @@ def _check_enough(room: str, allowed: NDArray[np.bool_], wanted: int) -> None:
     starts = HEADINGS * int(allowed.sum(axis=1).min())
     if starts < wanted:
         raise UserError(
-            f"protocol.starts: room '{room}' has only {starts} starts away from a source, and "
+            f"protocol.num_starts: room '{room}' has only {starts} starts away from a source, and "
             f"{wanted} are asked for; ask for fewer or take a larger apartment"
         )
 

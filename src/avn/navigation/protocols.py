@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from omegaconf import MISSING
 from torch import Tensor
 
 from avn.apartments.floor_plan import CELL
@@ -16,24 +15,8 @@ from avn.core.actions import STOP
 from avn.core.errors import UserError
 
 GOALS = ("box", "radius")
-PATHS = ("attempted", "walked")
+PATH_LENGTHS = ("moves", "metres")
 MOST = 100_000  # actions, starts and steps that are still a protocol
-
-
-@dataclass
-class ProtocolConfig:
-    """Schema of the config node `protocol`; the fields mean what `Protocol` says."""
-
-    _target_: str = "avn.navigation.protocols.Protocol"
-    name: str = MISSING
-    goal: str = MISSING
-    radius: float = 1.0
-    says_stop: bool = MISSING
-    path: str = MISSING
-    moves_factor: float | None = None
-    max_actions: int = 500
-    starts: int = 20
-    exploration: int = 400
 
 
 @dataclass(frozen=True)
@@ -49,58 +32,61 @@ class Protocol:
         the source along the shortest walk.
     radius : float
         Metres, for goal "radius".
-    says_stop : bool
+    requires_stop : bool
         Whether Stop is an action. If so, it ends the episode, and only Stop at the goal succeeds;
         if not, arriving there does.
-    path : {"attempted", "walked"}
-        What SPL measures. "attempted": p is attempted moves, blocked ones too, and l the moves of
-        the shortest walk to the nearest goal cell. "walked": p is metres walked and l the metres
+    path_length : {"moves", "metres"}
+        What SPL measures. "moves": p is attempted moves, blocked ones too, and l the moves of
+        the shortest walk to the nearest goal cell. "metres": p is metres walked and l the metres
         of the shortest walk to the source itself. Rotations count in neither.
-    moves_factor : float or None
+    max_moves_ratio : float or None
         The episode ends when attempted moves reach this many times the shortest moves to the
         source cell; None for no such cap.
     max_actions : int
         The episode ends after so many actions of any kind.
-    starts : int
+    num_starts : int
         Episodes of a frozen list for each source and sound.
-    exploration : int
+    exploration_steps : int
         Steps of the exploration walk, whose cells are no starts; 0 for no walk.
     """
 
     name: str
     goal: str
-    says_stop: bool
-    path: str
+    requires_stop: bool
+    path_length: str
     radius: float = 1.0
-    moves_factor: float | None = None
+    max_moves_ratio: float | None = None
     max_actions: int = 500
-    starts: int = 20
-    exploration: int = 400
+    num_starts: int = 20
+    exploration_steps: int = 400
 
     def __post_init__(self) -> None:
-        for key, value, known in (("goal", self.goal, GOALS), ("path", self.path, PATHS)):
+        for key, value, known in (
+            ("goal", self.goal, GOALS),
+            ("path_length", self.path_length, PATH_LENGTHS),
+        ):
             if value not in known:
                 raise UserError(f"protocol.{key}: '{value}' is none of {', '.join(known)}")
-        for key, least in (("max_actions", 1), ("starts", 1), ("exploration", 0)):
+        for key, least in (("max_actions", 1), ("num_starts", 1), ("exploration_steps", 0)):
             if not least <= getattr(self, key) <= MOST:
                 raise UserError(f"protocol.{key}: {getattr(self, key)}; give {least} to {MOST}")
         if not 0 <= self.radius <= MOST:
             raise UserError(f"protocol.radius: {self.radius}; give metres, 0 or more")
-        if self.moves_factor is not None and not 1 <= self.moves_factor <= MOST:
+        if self.max_moves_ratio is not None and not 1 <= self.max_moves_ratio <= MOST:
             raise UserError(
-                f"protocol.moves_factor: {self.moves_factor} is less than 1, so that no walk could "
-                "arrive; give at least 1, or null for no cap"
+                f"protocol.max_moves_ratio: {self.max_moves_ratio} is less than 1, so that no walk "
+                "could arrive; give at least 1, or null for no cap"
             )
 
     @property
     def actions(self) -> int:
         """How many actions there are: 5 with Stop, 4 without; they are numbered from 0."""
-        return STOP + 1 if self.says_stop else STOP
+        return STOP + 1 if self.requires_stop else STOP
 
     @property
     def counts_turns(self) -> bool:
         """Whether turning is paid for: where only the number of all actions ends an episode."""
-        return self.moves_factor is None
+        return self.max_moves_ratio is None
 
     def goal_cells(self, grid: Grid, sources: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Where an agent succeeds, (K, C)."""
@@ -123,16 +109,16 @@ class Protocol:
         -------
         success, over : (N,) bool
         """
-        if not self.says_stop:
+        if not self.requires_stop:
             return arrived, arrived
         stopped = action == STOP
         return arrived & stopped, stopped
 
     def most_moves(self, moves: Tensor) -> Tensor:
         """Attempted moves that end an episode whose shortest walk to the source has `moves`."""
-        if self.moves_factor is None:
+        if self.max_moves_ratio is None:
             return torch.full_like(moves, self.max_actions + 1, dtype=torch.int64)
-        return torch.ceil(self.moves_factor * moves.double()).long()
+        return torch.ceil(self.max_moves_ratio * moves.double()).long()
 
     def out_of_time(self, actions: Tensor, attempted: Tensor, most_moves: Tensor) -> Tensor:
         """Which episodes end since actions or attempted moves have been used up, (N,) bool."""

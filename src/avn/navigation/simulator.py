@@ -17,7 +17,7 @@ from avn.navigation.episodes import Episodes
 from avn.navigation.observations import SceneObservations
 from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
-from avn.navigation.tables import advance, build_tables
+from avn.navigation.scene_batch import advance, build_scene_batch
 
 # Episodes whose takes are drawn at once, so that the 64-bit draws stay in the cache.
 _CHUNK = 256
@@ -70,7 +70,7 @@ class Simulator:
         sounds = len(episodes.sounds)
         if observed.sounds not in (None, sounds):
             raise ValueError(f"clips of {observed.sounds} sounds, but episodes of {sounds}")
-        self.tables = build_tables([place], protocol, [observed], sounds)
+        self.tables = build_scene_batch([place], protocol, [observed], sounds)
         self._goal_row = self.tables.goal_row[self.source]
         self._origin = self.tables.origin(self.start)
         moves = self.tables.moves[self._goal_row + self.start]
@@ -127,7 +127,7 @@ class Simulator:
         self._collided = torch.where(running, blocked, self._collided)
         success, over = self.protocol.judged(actions, arrived)
         self.success |= success & running
-        if self.protocol.says_stop:
+        if self.protocol.requires_stop:
             self.stopped |= over & running
         self.done |= over & running
         self.done |= self.protocol.out_of_time(self.actions, self.attempted, self.max_attempts)
@@ -182,7 +182,7 @@ class Simulator:
         if self.tables.realisations == 1:
             return None
         draws = self.protocol.max_actions + 1
-        return drawn_takes(self.episodes, draws, self.tables.realisations).reshape(-1)
+        return drawn_realisations(self.episodes, draws, self.tables.realisations).reshape(-1)
 
     def _check(self, actions: Tensor) -> None:
         if actions.shape != self.state.shape or actions.dtype != torch.int64:
@@ -199,8 +199,8 @@ class Simulator:
             )
 
 
-def drawn_takes(
-    episodes: Episodes, draws: int, takes: int, rows: Sequence[int] | None = None
+def drawn_realisations(
+    episodes: Episodes, draws: int, realisations: int, rows: Sequence[int] | None = None
 ) -> Tensor:
     """The take that each episode hears after each number of actions, (N, draws) int16.
 
@@ -211,5 +211,5 @@ def drawn_takes(
     table = np.empty((len(keys), draws), dtype=np.int16)
     for begin in range(0, len(keys), _CHUNK):
         part = slice(begin, begin + _CHUNK)
-        table[part] = scramble(keys[part, None], steps[None, :]) % np.uint64(takes)
+        table[part] = scramble(keys[part, None], steps[None, :]) % np.uint64(realisations)
     return torch.from_numpy(table)

@@ -54,7 +54,7 @@ class Trace:
     action : (T,) int64
     collided : (T + 1,) bool
         Whether the action before was a blocked move.
-    take : (T + 1,) int64
+    realisation : (T + 1,) int64
         Which take of the clip of source, state and sound is heard.
     heard : (T + 1, 2) float64, or None
         East and north in metres of where the sound network took the source to be.
@@ -71,7 +71,7 @@ class Trace:
     state: NDArray[np.int64]
     action: NDArray[np.int64]
     collided: NDArray[np.bool_]
-    take: NDArray[np.int64]
+    realisation: NDArray[np.int64]
     heard: NDArray[np.float64] | None
     thoughts: Thoughts | None
     walk: NDArray[np.int64] | None

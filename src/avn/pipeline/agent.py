@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import torch
-from hydra.utils import instantiate
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
 from avn.agents.base import Agent
+from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.mapping.base import Mapper
-from avn.modules.network import build_part
 from avn.modules.stop_classifier import check_decision
 from avn.navigation.protocols import Protocol
 from avn.pipeline import policy, stop_classifier
@@ -44,7 +43,7 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
         learnt = policy.parts(cfg) if policy.learns(cfg) else {}
         if learnt and ready:
             learnt["network"] = policy.Policy(cfg).load()
-        return build_part(cfg.baseline, "baseline", **learnt)
+        return build_object("baseline", cfg.baseline, **learnt)
     if not cfg.planner._target_:
         raise UserError(
             "baseline: 'none' cannot act, and there is no planner; choose random_walk, greedy, "
@@ -52,17 +51,19 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
         )
     if not cfg.mapper._target_:
         raise UserError("mapper: 'none' remembers nothing to plan on; choose occupancy")
-    given: dict[str, Any] = {"mapper": build_part(_arguments(cfg.mapper))}
-    if cfg.agent.truth:
-        given["truth"] = cfg.agent.truth
+    given: dict[str, Any] = {"mapper": build_object("mapper", cfg.mapper)}
+    if cfg.agent.oracle_inputs:
+        given["oracle_inputs"] = cfg.agent.oracle_inputs
     if ready and decides(cfg):
         given["stop_at"] = stop_classifier.StopNetwork(cfg).threshold()
-    return build_part(_arguments(cfg.planner), **given)
+    return build_object("planner", cfg.planner, **given)
 
 
 def decides(cfg: DictConfig) -> bool:
     """Whether the agent says Stop by the probability of the stop classifier."""
-    return bool(cfg.planner._target_ and cfg.protocol.says_stop and stop_classifier.can_stop(cfg))
+    return bool(
+        cfg.planner._target_ and cfg.protocol.requires_stop and stop_classifier.can_stop(cfg)
+    )
 
 
 def agent_stages(cfg: DictConfig) -> list[Stage]:
@@ -89,10 +90,10 @@ def agent_ignored(cfg: DictConfig) -> list[str]:
     """Keys below those of `agent_settings` that make no difference to it."""
     unread = [f"mapper.{name}" for name in _OTHERS]
     agent, node = build_agent(cfg), "planner" if cfg.planner._target_ else "baseline"
-    protocol: Protocol = instantiate(cfg.protocol)
+    protocol: Protocol = build_object("protocol", cfg.protocol)
     unread += [f"{node}.{name}" for name in agent.unused_settings(protocol)]
     if cfg.planner._target_:
-        mapper: Mapper = build_part(_arguments(cfg.mapper))
+        mapper: Mapper = build_object("mapper", cfg.mapper)
         unread += [f"mapper.{name}" for name in mapper.unused_settings()]
     if policy.learns(cfg):
         acting = ("baseline.samples",)
@@ -104,18 +105,14 @@ def agent_ignored(cfg: DictConfig) -> list[str]:
 def check_agent(cfg: DictConfig, agent: Agent) -> None:
     """Refuse what an agent would stumble over once it acts, such as the size of its map."""
     if cfg.planner._target_:
-        agent.reset(1, torch.Generator(), instantiate(cfg.protocol))
+        agent.reset(1, torch.Generator(), build_object("protocol", cfg.protocol))
     if decides(cfg):
         check_decision(cfg.stop_model.criterion, cfg.stop_model.threshold)
 
 
 def check_no_truth(cfg: DictConfig) -> None:
     """Refuse to give a baseline parts of the truth, which none can use."""
-    if cfg.agent.truth:
-        raise UserError("agent.truth: only agents that plan can be given a part of the truth")
-
-
-def _arguments(node: DictConfig) -> dict[str, Any]:
-    """What the class of a mapper or planner takes."""
-    every: Any = OmegaConf.to_container(node, resolve=True)
-    return {key: value for key, value in every.items() if key not in _OTHERS}
+    if cfg.agent.oracle_inputs:
+        raise UserError(
+            "agent.oracle_inputs: only agents that plan can be given a part of the truth"
+        )

@@ -39,8 +39,8 @@ class AudioEmbeddings(AudioInference):
         return f"audio embeddings by '{name}' in {where} ({self.clips.purpose})"
 
     def by_products(self) -> Sequence[SourceEstimates]:
-        """Source estimates of a symmetric network, which are the last two numbers."""
-        if self.clips != Clips() or not self.cfg.sound_model.get("symmetric"):
+        """Source estimates of a network with `flip_tta`, which are the last two numbers."""
+        if self.clips != Clips() or not self.cfg.sound_model.get("flip_tta"):
             return ()
         return (SourceEstimates(self.cfg, self.apartments),)
 

@@ -15,15 +15,15 @@ from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra
-from avn.acoustics.microphone import MicrophoneConfig
+from avn.acoustics.microphone import Microphone
+from avn.core.classes import build_object
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
-from avn.core.prefetch import made_ahead, threads_for_one_operation
+from avn.core.prefetch import prefetch, threads_for_one_operation
 from avn.core.progress import progress_bar
-from avn.core.settings import typed
 from avn.dataset.scene import AudibleScene, Scene
 from avn.dataset.source_locations import where_sources_are
-from avn.modules.listener import Listener
+from avn.modules.audio_network import AudioNetwork
 from avn.modules.sound_metrics import location_errors
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.per_scene import ApartmentTensors
@@ -35,7 +35,7 @@ from avn.pipeline.trained import Fitted
 BATCH = 96
 # Draws the takes of what is heard; an episode draws among them from its own seed.
 HEARING_SEED = 0
-MOST_TAKES = 1000
+MOST_REALISATIONS = 1000
 # How fast two cores listen, roughly, to say how long it takes.
 CLIPS_PER_SECOND = 800
 
@@ -46,13 +46,13 @@ class Clips:
 
     Attributes
     ----------
-    takes : str
+    realisations : str
         The key of the config that says how many takes there are of each clip.
     purpose : {"eval", "train"}
         Takes of the one are never those of the other.
     """
 
-    takes: str = "takes"
+    realisations: str = "realisations"
     purpose: str = "eval"
 
 
@@ -82,9 +82,9 @@ class AudioInference(ApartmentTensors):
         return found
 
     @property
-    def takes(self) -> int:
+    def realisations(self) -> int:
         """How many takes there are of each clip."""
-        return int(OmegaConf.select(self.cfg, self.clips.takes))
+        return int(OmegaConf.select(self.cfg, self.clips.realisations))
 
     def needs(self) -> Sequence[Any]:
         """The network, and the sound of the apartments."""
@@ -92,7 +92,7 @@ class AudioInference(ApartmentTensors):
 
     def settings(self) -> Sequence[str]:
         """The microphone, and how many takes there are."""
-        return (self.apartments.world.microphone, self.clips.takes)
+        return (self.apartments.world.microphone, self.clips.realisations)
 
     def consulted(self) -> Sequence[str]:
         """The sounds, whose recordings are in the fingerprint."""
@@ -109,13 +109,14 @@ class AudioInference(ApartmentTensors):
     def seconds(self) -> float:
         """By the number of clips."""
         sounds = len(sound_files(self.cfg, self.apartments.world))
-        return 4 * self.apartments.pairs * sounds * self.takes / CLIPS_PER_SECOND
+        return 4 * self.apartments.pairs * sounds * self.realisations / CLIPS_PER_SECOND
 
     def check(self) -> None:
         """Refuse a number of takes that cannot be."""
-        if not 1 <= self.takes <= MOST_TAKES:
+        if not 1 <= self.realisations <= MOST_REALISATIONS:
             raise UserError(
-                f"{self.clips.takes}: {self.takes} is out of range; give 1 to {MOST_TAKES}"
+                f"{self.clips.realisations}: {self.realisations} is out of range; give 1 to "
+                f"{MOST_REALISATIONS}"
             )
 
     def opened(self) -> Callable[[int], Tensor]:
@@ -123,14 +124,14 @@ class AudioInference(ApartmentTensors):
         network, sound = self.needs()
         model, scenes = network.load(), sound.load()
         sounds = dry_sounds(self.cfg, self.apartments.world)
-        microphone = typed(self.apartments.node("microphone"))
+        microphone = build_object("microphone", self.apartments.node("microphone"))
 
         def listen(index: int) -> Tensor:
             return hear(
                 scenes[index],
                 sounds,
                 model,
-                self.takes,
+                self.realisations,
                 microphone,
                 seed=HEARING_SEED,
                 purpose=self.clips.purpose,
@@ -143,9 +144,9 @@ class AudioInference(ApartmentTensors):
 def hear(
     scene: AudibleScene,
     sounds: DrySounds,
-    model: Listener,
-    takes: int,
-    microphone: MicrophoneConfig,
+    model: AudioNetwork,
+    realisations: int,
+    microphone: Microphone,
     seed: int = 0,
     progress: bool = True,
     purpose: str = "eval",
@@ -158,11 +159,11 @@ def hear(
     scene : AudibleScene
         An apartment with K sources and S = 4 C states.
     sounds : DrySounds
-    model : Listener
+    model : AudioNetwork
         Trained; it is set to evaluation.
-    takes : int
-        Takes 0 to `takes` - 1 of the purpose.
-    microphone : MicrophoneConfig
+    realisations : int
+        Takes 0 to `realisations` - 1 of the purpose.
+    microphone : Microphone
     seed : int
         Draws the takes.
     progress : bool
@@ -181,8 +182,10 @@ def hear(
     renderer = ClipRenderer(sounds, microphone, seed, purpose)
     sources, states = len(scene.sources), 4 * len(scene.grid.lattice)
     source, state = torch.cartesian_prod(torch.arange(sources), torch.arange(states)).unbind(1)
-    each = len(sounds.names) * takes
-    sound, take = torch.cartesian_prod(torch.arange(len(sounds.names)), torch.arange(takes)).T
+    each = len(sounds.names) * realisations
+    sound, realisation = torch.cartesian_prod(
+        torch.arange(len(sounds.names)), torch.arange(realisations)
+    ).T
     heard: list[Tensor] = []
     model.eval()
     what = f"listening in {scene.name}"
@@ -193,17 +196,17 @@ def hear(
         # Whole pairs, so that an impulse response is transformed once for all its clips.
         spectra = brir_spectra(brirs.gather(source[rows], state[rows]))
         index = torch.arange(len(rows)).repeat_interleave(each)
-        repeated = sound.repeat(len(rows)), take.repeat(len(rows))
+        repeated = sound.repeat(len(rows)), realisation.repeat(len(rows))
         clip = ClipId(source[rows][index], state[rows][index], *repeated)
         clips = renderer.render(spectra, clip, index)
         return (answer or model)(clips.to(model.device)).cpu()
 
     threads, parts = torch.get_num_threads(), torch.arange(len(source)).split(max(1, BATCH // each))
     with bar as advance, threads_for_one_operation(1):
-        for found in made_ahead(listen, parts, threads):
+        for found in prefetch(listen, parts, threads):
             heard.append(found)
             advance(len(found))
-    return torch.cat(heard).unflatten(0, (sources, states, len(sounds.names), takes))
+    return torch.cat(heard).unflatten(0, (sources, states, len(sounds.names), realisations))
 
 
 def _silent(count: int) -> None:
@@ -240,7 +243,7 @@ def sound_errors(scene: Scene, heard: Tensor, sounds: Sequence[str]) -> pd.DataF
             m, d = metres[:, :, chosen][picked].numpy(), degrees[:, :, chosen][picked].numpy()
             rows.append(
                 {
-                    "room": scene.name,
+                    "scene": scene.name,
                     "sound": name,
                     "sight": sight,
                     "clips": len(m),

@@ -13,7 +13,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from avn.core.progress import bars_in, progress_columns, span
+from avn.core.progress import bars_in, format_duration, progress_columns
 
 # Lines beside the stages and rows: headings, stages taken together, bars, time.
 _OTHERS = 8
@@ -94,8 +94,8 @@ class Dashboard:
 
     def render(self) -> RenderableType:
         """All of it."""
-        passed = span(time.monotonic() - self._started)
-        left = f"{passed} passed, about {span(self.time_left())} left"
+        passed = format_duration(time.monotonic() - self._started)
+        left = f"{passed} passed, about {format_duration(self.time_left())} left"
         return Group(Text(left, style="bold"), self._row_table(), self._stage_table(), self._bars)
 
     def _stage_table(self) -> Table:
@@ -108,17 +108,22 @@ class Dashboard:
         first = max(0, done - lines // 3)
         last = first + lines
         if first:
-            table.add_row(f"{first} stages", "", span(sum(self._took[:first])), style="dim")
+            table.add_row(
+                f"{first} stages", "", format_duration(sum(self._took[:first])), style="dim"
+            )
         for number, (title, seconds) in list(enumerate(self._stages))[first:last]:
             took, style = "", ""
             if number < done:
-                took, style = span(self._took[number]), "green"
+                took, style = format_duration(self._took[number]), "green"
             elif number == done:
-                took, style = f"{span(time.monotonic() - self._began)} ...", "bold yellow"
-            table.add_row(Text(title), span(seconds), took, style=style)
+                took, style = (
+                    f"{format_duration(time.monotonic() - self._began)} ...",
+                    "bold yellow",
+                )
+            table.add_row(Text(title), format_duration(seconds), took, style=style)
         rest = self._stages[last:]
         if rest:
-            planned = span(sum(seconds for _, seconds in rest))
+            planned = format_duration(sum(seconds for _, seconds in rest))
             table.add_row(f"{len(rest)} more stages", planned, "", style="dim")
         return table
 

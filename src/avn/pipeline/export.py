@@ -9,10 +9,11 @@ import torch
 from omegaconf import DictConfig
 
 from avn.acoustics.clips import ClipRenderer, brir_spectra, export_wav
+from avn.core.classes import build_object
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
-from avn.core.progress import tell
-from avn.core.settings import leaves, typed
+from avn.core.progress import log
+from avn.core.settings import leaves
 from avn.dataset.scene import AudibleScene, Scene
 from avn.dataset.views import Views
 from avn.pipeline.apartments import apartments_of_every_part
@@ -49,7 +50,7 @@ def generate(cfg: DictConfig) -> Path:
     if cfg.export is None and (cfg.clips or cfg.apartments):
         raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
     for stage in missing(stages_of(cfg)):
-        make(stage, asked=True)
+        make(stage, explicit=True)
     every: list[AudibleScene] = []
     for apartments in apartments_of_every_part(cfg):
         sound, rendered = DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
@@ -85,7 +86,7 @@ def _report(cfg: DictConfig, scene: AudibleScene) -> None:
     share = np.mean(10 ** (scene.brirs.cut_db / 10))
     mean = 10 * np.log10(share) if share > 0 else -np.inf
     size = sum(path.stat().st_size for path in scene.folder.glob("*.h5")) / 1e6
-    tell(
+    log(
         f"{scene.folder}: {scene.grid.cells} cells, {len(scene.plan.rooms)} rooms, "
         f"{len(scene.sources)} sources, {size:.0f} MB; energy after {cfg.acoustics.seconds} s: "
         f"{mean:.0f} dB of the reverberation on average, {scene.brirs.cut_db.max():.0f} dB at most"
@@ -102,7 +103,9 @@ def _chosen(cfg: DictConfig, every: list[AudibleScene]) -> list[AudibleScene]:
 
 def _export(cfg: DictConfig, chosen: list[AudibleScene]) -> None:
     sounds = dry_sounds(cfg)
-    render = ClipRenderer(sounds, typed(cfg.microphone), seed=0, purpose="eval")
+    render = ClipRenderer(
+        sounds, build_object("microphone", cfg.microphone), seed=0, purpose="eval"
+    )
     for which in chosen:
         pairs = [tuple(pair) for pair in cfg.clips] or _near_and_far(which)
         _check_pairs(which, pairs)
@@ -114,7 +117,7 @@ def _export(cfg: DictConfig, chosen: list[AudibleScene]) -> None:
             for (k, s), clip in zip(pairs, clips, strict=True):
                 file = f"{name}-{cfg.acoustics.name}-source{k}-state{s}.wav"
                 export_wav(which.folder / "wav" / file, clip)
-        tell(f"{which.name}: {len(pairs) * len(sounds)} clips in {which.folder / 'wav'}")
+        log(f"{which.name}: {len(pairs) * len(sounds)} clips in {which.folder / 'wav'}")
 
 
 def _near_and_far(which: Scene) -> list[tuple[int, int]]:

@@ -7,9 +7,9 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from avn.core.errors import UserError
-from avn.core.files import check_name, locked, written_whole
+from avn.core.files import atomic_write, check_name, locked
 from avn.core.hashing import digest
-from avn.core.progress import span, tell
+from avn.core.progress import format_duration, log
 from avn.core.settings import leaves, plain
 from avn.pipeline import replay
 from avn.pipeline.observed import Perceived, observed_stages, soundtrack
@@ -63,13 +63,13 @@ def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
     run = Run(folder, cfg, *read_run(folder))
     labels = replay.choose(run.episodes, cfg.film_show, cfg.film)
     if not labels:
-        tell(f"film_show: the run has no episode that is a {cfg.film_show}")
+        log(f"film_show: the run has no episode that is a {cfg.film_show}")
     paths = {label: folder / FOLDER / _name(run, label) for label in labels}
     if labels:
         with locked(folder / FOLDER, "films"):
             _make_missing(run, paths)
     for path in paths.values():
-        tell(str(path))
+        log(str(path))
     return list(paths.values())
 
 
@@ -79,13 +79,13 @@ def _make_missing(run: Run, paths: dict[int, Path]) -> None:
     if not (mark.is_file() and mark.read_text() == made_from):
         for old in (run.folder / FOLDER).glob("*.mp4"):
             old.unlink()
-        with written_whole(mark) as part:
+        with atomic_write(mark) as part:
             part.write_text(made_from)
     missing = {label: path for label, path in paths.items() if not path.is_file()}
     if missing:
         what = "film" if len(missing) == 1 else f"{len(missing)} films"
         name = run.cfg.agent.name
-        tell(f"{what} of '{name}' missing: making (about {span(15.0 * len(missing))})")
+        log(f"{what} of '{name}' missing: making (about {format_duration(15.0 * len(missing))})")
         _write(run, missing)
 
 
@@ -98,7 +98,7 @@ def _fingerprint(cfg: DictConfig) -> str:
 def _name(run: Run, label: int) -> str:
     row = run.episodes.loc[label]
     check_name("sound", str(row["sound"]))
-    return f"{row['room']}-{row['sound']}-{row['episode']}-{row['outcome']}.mp4"
+    return f"{row['scene']}-{row['sound']}-{row['episode']}-{row['outcome']}.mp4"
 
 
 def _write(run: Run, paths: dict[int, Path]) -> None:

@@ -54,7 +54,7 @@ def train_model(stage: Trained) -> dict[str, float]:
     UserError
         Where what it needs is missing and `auto` is false, or it is damaged.
     """
-    build(stage, asked=True)
+    build(stage, explicit=True)
     stage.load()  # a damaged checkpoint is told now
     metrics, begin = stage.metrics(), MODELS[stage.cfg.model.name][1]
     by_sound = sound_files(stage.cfg, TRAINING)

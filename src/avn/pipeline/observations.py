@@ -48,7 +48,7 @@ class Observation:
     hint : str
         What to do where it has not.
     truth : str, optional
-        The part of `agent.truth` that stands in for it.
+        The part of `agent.oracle_inputs` that stands in for it.
     true : callable, optional
         Apartments and their scenes to the true tensors.
     settings : tuple of str
@@ -84,17 +84,17 @@ def _true_patches(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tenso
 
 
 OBSERVATIONS = {
-    "sound": Observation(
+    "source_estimate": Observation(
         shape="(2,): where the source is heard, metres right and front",
         hint="choose a sound model, such as sound_model=cnn5",
         audio=True,
         stage=SourceEstimates,
         load=SourceEstimates.load,
         there=hears,
-        truth="location",
+        truth="source_estimate",
         true=_true_estimates,
     ),
-    "reach": Observation(
+    "stop_probability": Observation(
         shape="(): probability that the source is within reach",
         hint="choose what tells when to stop, such as stop_model=cnn5",
         audio=True,
@@ -102,7 +102,7 @@ OBSERVATIONS = {
         load=StopProbabilities.load,
         there=can_stop,
     ),
-    "sound_feature": Observation(
+    "audio_embedding": Observation(
         shape="(D,): last layer of the sound network",
         hint="choose a sound model, such as sound_model=cnn5",
         audio=True,
@@ -124,20 +124,20 @@ OBSERVATIONS = {
         stage=lambda cfg, apartments, clips: RenderedViews(cfg, apartments),
         load=lambda stage: [torch.from_numpy(views.depth[:]) for views in stage.load()],
     ),
-    "feature": Observation(
+    "visual_embedding": Observation(
         shape="(D,): last layer of the backbone, of length 1",
         audio=False,
         stage=lambda cfg, apartments, clips: VisualEmbeddings(cfg, apartments),
         load=VisualEmbeddings.load,
     ),
-    "window": Observation(
+    "local_patch": Observation(
         shape="(5, 5): probability that cells ahead are free; NaN where none can tell",
         hint="choose what sees free squares, such as occupancy_model=small",
         audio=False,
         stage=lambda cfg, apartments, clips: LocalPatches(cfg, apartments),
         load=LocalPatches.trusted,
         there=sees_windows,
-        truth="window",
+        truth="local_patch",
         true=_true_patches,
         settings=("mapper.visible_above",),
         true_settings=tuple(f"renderer.camera.{own}" for own in ("height", "pitch", "fov")),
@@ -186,7 +186,9 @@ class Observed:
         for truth in self._truth:
             shown = [name for name, own in OBSERVATIONS.items() if own.truth == truth]
             if shown and not set(shown) & set(wanted):
-                raise UserError(f"agent.truth: '{truth}' is nothing that agent {agent} observes")
+                raise UserError(
+                    f"agent.oracle_inputs: '{truth}' is nothing that agent {agent} observes"
+                )
         for name in wanted:
             start = f"agent {agent} needs the observation '{name}'"
             if name not in (*OBSERVATIONS, *OWN):

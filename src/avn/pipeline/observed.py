@@ -11,8 +11,8 @@ from omegaconf import DictConfig
 from torch import Tensor
 
 from avn.acoustics.clips import CLIP_SAMPLES, FADE_SAMPLES, ClipRenderer, brir_spectra
+from avn.core.classes import build_object
 from avn.core.clip_id import ClipId
-from avn.core.settings import typed
 from avn.navigation.trace import Trace
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import HEARING_SEED
@@ -28,7 +28,7 @@ _BATCH = 64
 
 def observed_stages(cfg: DictConfig) -> tuple[DirectSound, RenderedViews]:
     """What pictures and clips of a run are made from."""
-    apartments = Apartments(cfg, cfg.part)
+    apartments = Apartments(cfg, cfg.subset)
     return DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
 
 
@@ -51,7 +51,9 @@ class Perceived:
         self._scenes = {scene.name: scene for scene in sound.load()}
         self._views = dict(zip(self._scenes, (own.rgb for own in rendered.load()), strict=True))
         # the clips of `SourceEstimates`: same microphone, seed and purpose
-        self._renderer = ClipRenderer(dry_sounds(cfg), typed(cfg.microphone), HEARING_SEED, "eval")
+        self._renderer = ClipRenderer(
+            dry_sounds(cfg), build_object("microphone", cfg.microphone), HEARING_SEED, "eval"
+        )
 
     def views(self, room: str, states: Sequence[int] | NDArray[np.int64]) -> NDArray[np.uint8]:
         """First-person views of some states of a room, (N, H, W, 3) uint8."""
@@ -60,13 +62,17 @@ class Perceived:
     def clips(self, trace: Trace) -> Tensor:
         """What is heard at each step, (T + 1, 2, 16000) float32, left and right ear."""
         brirs = self._scenes[trace.place.name].brirs
-        state, take = torch.from_numpy(trace.state), torch.from_numpy(trace.take)
+        state, realisation = torch.from_numpy(trace.state), torch.from_numpy(trace.realisation)
         parts = []
-        for states, takes in zip(state.split(_BATCH), take.split(_BATCH), strict=True):
+        for states, realisations in zip(
+            state.split(_BATCH), realisation.split(_BATCH), strict=True
+        ):
             source = torch.full_like(states, trace.source)
             sound = torch.full_like(states, trace.sound)
             spectra = brir_spectra(brirs.gather(source, states))
-            parts.append(self._renderer.render(spectra, ClipId(source, states, sound, takes)))
+            parts.append(
+                self._renderer.render(spectra, ClipId(source, states, sound, realisations))
+            )
         return torch.cat(parts)
 
 

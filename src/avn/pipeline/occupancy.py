@@ -16,13 +16,13 @@ from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid
 from avn.apartments.local_patch import window_cells
 from avn.apartments.surfaces import build_surfaces
+from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.progress import progress_bar
 from avn.core.settings import plain, typed
 from avn.datamodules.views import Seen, ViewData
 from avn.dataset.scene import Scene
 from avn.dataset.views import Views
-from avn.modules.network import build_part
 from avn.modules.occupancy_cnn import OccupancyCnn
 from avn.modules.window_metrics import calibrated, window_metrics
 from avn.pipeline.per_scene import ApartmentTensors
@@ -50,14 +50,13 @@ class OccupancyNetwork(Fitted):
         """Refuse a config that has no such network."""
         if not sees_windows(self.cfg):
             raise UserError("occupancy_model: 'none' sees no free cells; choose small or released")
-        if self.cfg.occupancy_model.looks < 1:
-            raise UserError(
-                f"occupancy_model.looks: {self.cfg.occupancy_model.looks}; give 1 or more"
-            )
+        if self.cfg.occupancy_model.appearances < 1:
+            given = self.cfg.occupancy_model.appearances
+            raise UserError(f"occupancy_model.appearances: {given}; give 1 or more")
         super().check()
 
     def _views(self) -> list[RenderedViews]:
-        looks = range(self.cfg.occupancy_model.looks)
+        looks = range(self.cfg.occupancy_model.appearances)
         train = [RenderedViews(self.cfg, self.train, look) for look in looks]
         return [*train, RenderedViews(self.cfg, self.validation)]
 
@@ -85,7 +84,9 @@ class OccupancyNetwork(Fitted):
         """The network before training."""
         recipe = self.cfg.occupancy_model
         torch.manual_seed(recipe.train_seed)
-        model: OccupancyCnn = build_part(recipe, camera=plain(self.cfg, "renderer.camera"))
+        model: OccupancyCnn = build_object(
+            "occupancy_model", recipe, camera=plain(self.cfg, "renderer.camera")
+        )
         return model
 
     def data(self) -> ViewData:
@@ -222,5 +223,5 @@ def window_errors(
             found = window_metrics(estimate, *truth)
             for cells in ("all", "visible"):
                 own = {k.split("/")[0]: v for k, v in found.items() if k.endswith(f"/{cells}")}
-                rows.append({"room": name, "by": by, "cells": cells, **own})
+                rows.append({"scene": name, "by": by, "cells": cells, **own})
     return pd.DataFrame(rows)

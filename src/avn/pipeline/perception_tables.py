@@ -23,7 +23,7 @@ from avn.pipeline.sounds import sound_files
 from avn.reporting import perception_tables, results
 from avn.reporting.table import wide_console
 
-HEARD, SEEN, PLACES = "hearing.csv", "windows.csv", "places.csv"
+HEARD, SEEN, PLACES = "source_estimates.csv", "local_patches.csv", "localisation.csv"
 TABLES = {
     HEARD: perception_tables.heard_table,
     SEEN: perception_tables.windows_table,
@@ -51,16 +51,16 @@ def write(
         What is heard and seen in each room.
     """
     cfg, stages = observed.cfg, observed.stages
-    if "sound" in stages:
-        heard = [own.audio["sound"] for own in observations]
+    if "source_estimate" in stages:
+        heard = [own.audio["source_estimate"] for own in observations]
         results.write_csv(_heard(cfg, rooms, heard), folder / HEARD)
-    if "window" in stages:
-        estimates = [own[:, 0] for own in stages["window"].load()]
+    if "local_patch" in stages:
+        estimates = [own[:, 0] for own in stages["local_patch"].load()]
         prior = OccupancyNetwork(cfg).prior()
         seen = window_errors(rooms, typed(cfg.renderer.camera), estimates, prior)
         results.write_csv(seen, folder / SEEN)
-    if "feature" in stages and "top" in cfg.mapper:
-        features = [own.visual["feature"] for own in observations]
+    if "visual_embedding" in stages and "top" in cfg.mapper:
+        features = [own.visual["visual_embedding"] for own in observations]
         results.write_csv(_places(cfg, rooms, walks, features), folder / PLACES)
 
 
@@ -89,5 +89,5 @@ def _places(
     for room, own, seen in zip(rooms, walks, features, strict=True):
         lattice = torch.from_numpy(room.grid.lattice).long()
         found.append(place_errors(lattice, seen, torch.from_numpy(own), cfg.mapper.top))
-        found[-1].insert(0, "room", room.name)
+        found[-1].insert(0, "scene", room.name)
     return pd.concat(found, ignore_index=True)

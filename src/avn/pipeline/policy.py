@@ -9,22 +9,22 @@ from typing import Any
 
 import pandas as pd
 import torch
-from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
-from avn.agents.actor_critic import ActorCriticAgent, ActorCriticConfig
-from avn.agents.rollout import Labels, walk_room
+from avn.agents.actor_critic import ActorCriticAgent
+from avn.agents.rollout import Labels, rollout_scene
+from avn.core.classes import build_object, import_class
 from avn.core.errors import UserError
 from avn.core.files import check_name
-from avn.core.settings import plain, typed
+from avn.core.settings import plain
 from avn.dataset.scene import Scene
 from avn.mapping.ego_map import EgoMap
 from avn.navigation.episodes import frozen_episodes
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
-from avn.navigation.tables import Tables, build_tables
+from avn.navigation.scene_batch import SceneBatch, build_scene_batch
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.observations import Observed
@@ -34,11 +34,11 @@ from avn.pipeline.sound_network import hears
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stage import Stage
 from avn.pipeline.trained import METRICS, Trained
-from avn.rl.a3c import BEST, MONITOR, Training, load_network
-from avn.rl.config import check_recipe
-from avn.rl.explorations import draw_walks
-from avn.rl.networks import ActorCritic, Shape
-from avn.rl.worker import Task
+from avn.rl.algorithm import Algorithm
+from avn.rl.exploration_memory import draw_walks
+from avn.rl.networks import ActorCritic, NetworkSpec
+from avn.rl.training import BEST, MONITOR, Training, load_network
+from avn.rl.worker import TrainingSpec
 
 # Draws the episodes on which an agent is measured while it learns.
 MEASURED_SEED = 0
@@ -49,7 +49,16 @@ _EXAMPLES = 200_000
 
 def learns(cfg: DictConfig) -> bool:
     """Whether the config's agent is an actor-critic."""
-    return OmegaConf.get_type(cfg.baseline) is ActorCriticConfig
+    target = cfg.baseline._target_
+    return bool(target) and issubclass(import_class("baseline._target_", target), ActorCriticAgent)
+
+
+def build_algorithm(cfg: DictConfig) -> Algorithm:
+    """The algorithm of a config; raises `UserError` where there is none, or it cannot work."""
+    if not cfg.algorithm._target_:
+        raise UserError("algorithm: 'none' trains nothing; choose a3c")
+    algorithm: Algorithm = build_object("algorithm", cfg.algorithm)
+    return algorithm
 
 
 def parts(cfg: DictConfig) -> dict[str, Any]:
@@ -74,9 +83,11 @@ class Policy(Trained):
                 f"agent: '{self.cfg.agent.name}' is no actor-critic; choose model=a3c_va"
             )
         check_name("agent.name", self.cfg.agent.name)
-        check_recipe(typed(self.cfg.a3c))
-        if self.cfg.baseline.memory and not self.cfg.protocol.exploration:
-            raise UserError("protocol.exploration: 0, and an agent with memory explores; give 400")
+        build_algorithm(self.cfg)
+        if self.cfg.baseline.memory and not self.cfg.protocol.exploration_steps:
+            raise UserError(
+                "protocol.exploration_steps: 0, and an agent with memory explores; give 400"
+            )
         if sees_windows(self.cfg):
             EgoMap(1, self.cfg.mapper.size, self.cfg.baseline.map_width)
 
@@ -89,7 +100,7 @@ class Policy(Trained):
         maps = ("mapper.size",) if sees_windows(self.cfg) else ()
         shaped = observed(self.cfg, "train").settings
         # its name names the folder, so that two rows never share one
-        return ("agent.name", "baseline", "a3c", "protocol", *maps, *shaped)
+        return ("agent.name", "baseline", "algorithm", "protocol", *maps, *shaped)
 
     def ignored(self) -> Sequence[str]:
         """How it acts once it is trained, and what agents without memory or map have not."""
@@ -98,26 +109,30 @@ class Policy(Trained):
         return [
             "baseline.samples",
             # of evaluations, and a label
-            "protocol.starts",
+            "protocol.num_starts",
             "protocol.name",
-            *(() if memory else ("a3c.walks", "a3c.refresh")),
+            *(
+                ()
+                if memory
+                else ("algorithm.exploration_walks", "algorithm.memory_refresh_interval")
+            ),
             *(() if maps else ("baseline.map_width",)),
             *(() if memory and maps else ("baseline.top",)),
             *(("protocol.radius",) if radius else ()),
-            *(() if hears(self.cfg) else ("a3c.takes",)),
+            *(() if hears(self.cfg) else ("algorithm.realisations",)),
         ]
 
     @property
     def title(self) -> str:
         """What it is."""
-        acoustics, seed = self.train.node("acoustics").name, self.cfg.a3c.train_seed
+        acoustics, seed = self.train.node("acoustics").name, self.cfg.algorithm.train_seed
         settings = f"{acoustics}, {self.cfg.protocol.name}, train_seed {seed}"
         return f"agent '{self.cfg.agent.name}' ({settings})"
 
     def seconds(self) -> float:
         """By the number of actions and what is computed for each."""
         microseconds = 30 + 30 * sees_windows(self.cfg) + 30 * bool(self.cfg.baseline.memory)
-        return float(self.cfg.a3c.total * microseconds / 1e6 * 1.6)
+        return float(self.cfg.algorithm.total_steps * microseconds / 1e6 * 1.6)
 
     def make(self) -> None:
         """Train it, or go on where a killed training was."""
@@ -149,9 +164,9 @@ def observed(cfg: DictConfig, part: str) -> Observed:
     """What an actor-critic observes in a part of the training world."""
     given = parts(cfg)
     names = ActorCriticAgent(hears=given["hears"], maps=given["maps"]).wants(
-        instantiate(cfg.protocol)
+        build_object("protocol", cfg.protocol)
     )
-    clips = Clips("a3c.takes", "train") if part == "train" else Clips()
+    clips = Clips("algorithm.realisations", "train") if part == "train" else Clips()
     return Observed(Apartments(cfg, part, TRAINING), names, clips)
 
 
@@ -167,16 +182,16 @@ def load_part(cfg: DictConfig, part: str) -> tuple[list[Scene], list[SceneObserv
     return scenes, observed(cfg, part).load(scenes)
 
 
-def tables_of(cfg: DictConfig, opened: tuple[list[Scene], list[SceneObservations]]) -> Tables:
+def tables_of(cfg: DictConfig, opened: tuple[list[Scene], list[SceneObservations]]) -> SceneBatch:
     """The apartments of `load_part` as tables, under the protocol of the config."""
     rooms, observations = opened
     sounds = len(sound_files(cfg, TRAINING))
-    return build_tables(rooms, instantiate(cfg.protocol), observations, sounds)
+    return build_scene_batch(rooms, build_object("protocol", cfg.protocol), observations, sounds)
 
 
-def _shape(cfg: DictConfig, features: dict[str, int]) -> Shape:
-    protocol: Protocol = instantiate(cfg.protocol)
-    return Shape(
+def _shape(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
+    protocol: Protocol = build_object("protocol", cfg.protocol)
+    return NetworkSpec(
         features=features,
         actions=protocol.actions,
         width=cfg.baseline.width,
@@ -189,7 +204,7 @@ def _shape(cfg: DictConfig, features: dict[str, int]) -> Shape:
 def _train(policy: Policy) -> None:
     """Train, and write what was measured."""
     started = time.perf_counter()
-    cfg, recipe = policy.cfg, typed(policy.cfg.a3c)
+    cfg, recipe = policy.cfg, build_algorithm(policy.cfg)
     opened = {part: load_part(cfg, part) for part in PARTS}
     tables = tables_of(cfg, opened["train"])
     features = _sizes(tables)
@@ -200,8 +215,8 @@ def _train(policy: Policy) -> None:
         table = tables.visual.get(name, tables.audio.get(name))
         assert table is not None
         network.standardise(name, table[:: max(1, len(table) // _EXAMPLES)])
-    protocol: Protocol = instantiate(cfg.protocol)
-    task = Task(
+    protocol: Protocol = build_object("protocol", cfg.protocol)
+    spec = TrainingSpec(
         tables=tables,
         protocol=protocol,
         shape=shape,
@@ -212,28 +227,34 @@ def _train(policy: Policy) -> None:
         top=cfg.baseline.top,
     )
     measure = Measure(cfg, opened, protocol)
-    curve = Training(task, network, policy.folder, measure, policy.fingerprint).run()
+    curve = Training(spec, network, policy.folder, measure, policy.fingerprint).run()
     best = max(curve, key=lambda own: own[MONITOR])
     metrics: dict[str, Any] = {f"best/{name}": value for name, value in best.items()}
     metrics |= {f"untrained/{name}": value for name, value in curve[0].items()}
     metrics |= {"features": features, "steps": curve[-1]["steps"]}
     metrics |= {"seconds": time.perf_counter() - started}
-    policy.finish(metrics, {name: plain(cfg, name) for name in ("baseline", "a3c", "protocol")})
+    policy.finish(
+        metrics, {name: plain(cfg, name) for name in ("baseline", "algorithm", "protocol")}
+    )
 
 
-def _sizes(tables: Tables) -> dict[str, int]:
+def _sizes(tables: SceneBatch) -> dict[str, int]:
     """Sizes of what a network takes as features, by name."""
     both = {**tables.visual, **tables.audio}
     return {
-        name: int(both[name].shape[-1]) for name in ("feature", "sound_feature") if name in both
+        name: int(both[name].shape[-1])
+        for name in ("visual_embedding", "audio_embedding")
+        if name in both
     }
 
 
-def _walks(cfg: DictConfig, rooms: Sequence[Scene], tables: Tables) -> Tensor | None:
+def _walks(cfg: DictConfig, rooms: Sequence[Scene], tables: SceneBatch) -> Tensor | None:
     if not cfg.baseline.memory:
         return None
-    steps = cfg.protocol.exploration
-    return draw_walks([*rooms], tables, cfg.a3c.walks, steps, cfg.a3c.train_seed)
+    steps = cfg.protocol.exploration_steps
+    return draw_walks(
+        [*rooms], tables, cfg.algorithm.exploration_walks, steps, cfg.algorithm.train_seed
+    )
 
 
 def _returns(walked: pd.DataFrame, reward: RewardConfig) -> pd.Series:
@@ -248,7 +269,7 @@ class Measure:
 
     def __init__(self, cfg: DictConfig, observed: dict[str, Any], protocol: Protocol) -> None:
         self._cfg, self._observed = cfg, observed
-        self._protocol = dataclasses.replace(protocol, starts=cfg.a3c.validation_starts)
+        self._protocol = dataclasses.replace(protocol, num_starts=cfg.algorithm.validation_starts)
         acoustics = OmegaConf.select(cfg, TRAINING.acoustics).name
         self._labels = Labels(agent=cfg.agent.name, acoustics=acoustics)
 
@@ -262,10 +283,10 @@ class Measure:
         for part, (rooms, observations) in self._observed.items():
             name = "training" if part == "train" else part
             walked = pd.concat(
-                walk_room(agent, room, self._episodes(room), self._protocol, self._labels, own)
+                rollout_scene(agent, room, self._episodes(room), self._protocol, self._labels, own)
                 for room, own in zip(rooms, observations, strict=True)
             )
-            found[f"{name}/return"] = float(_returns(walked, self._cfg.a3c.reward).mean())
+            found[f"{name}/return"] = float(_returns(walked, self._cfg.algorithm.reward).mean())
             found[f"{name}/success"] = float(walked["success"].mean())
             found[f"{name}/spl"] = float(walked["spl"].mean())
         return found

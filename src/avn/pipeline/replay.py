@@ -111,8 +111,8 @@ def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
     # of equals the one whose source is as far away as usual, for it is neither easy nor odd
     far = (chosen["geodesic"] - episodes["geodesic"].median()).abs()
     ranked = chosen.assign(off=off, far=far).sort_values(["off", "far"], kind="stable")
-    ranked["round"] = ranked.groupby(["room", "sound"]).cumcount()
-    ranked["room_round"] = ranked.groupby(["round", "room"]).cumcount()
+    ranked["round"] = ranked.groupby(["scene", "sound"]).cumcount()
+    ranked["room_round"] = ranked.groupby(["round", "scene"]).cumcount()
     ranked = ranked.sort_values(["round", "room_round", "off", "far"], kind="stable")
     return [int(label) for label in ranked.index[:count]]
 
@@ -137,7 +137,7 @@ def same_episodes(run: Run, labels: Sequence[int], other: Run) -> list[int]:
 
 def episode_keys(episodes: pd.DataFrame) -> list[tuple[Any, ...]]:
     """What tells which episode a record is of, whoever walked it."""
-    keys = ["room", "sound", "seed", "episode", "source_cell", "start_cell", "start_heading"]
+    keys = ["scene", "sound", "seed", "episode", "source_cell", "start_cell", "start_heading"]
     return [tuple(row) for row in episodes[keys].itertuples(index=False)]
 
 
@@ -198,13 +198,14 @@ def traces(run: Run, labels: Sequence[int], thoughts: bool = True) -> list[Trace
 
 def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[list[Trace]]:
     """As `traces`, of several choices in one walk."""
-    asked = list(wanted)
-    names = set(run.episodes.loc[[label for labels, _ in asked for label in labels], "room"])
+    explicit = list(wanted)
+    names = set(run.episodes.loc[[label for labels, _ in explicit for label in labels], "scene"])
     kept = [index for index, room in enumerate(run.rooms) if room.name in names]
     # in a batch the episodes of a room stand in the order of its records
-    rows = run.episodes.groupby("room").cumcount()
+    rows = run.episodes.groupby("scene").cumcount()
     recorders = [
-        Recorder(_by_room(run, rows, labels), run.cfg.takes, thoughts) for labels, thoughts in asked
+        Recorder(_by_room(run, rows, labels), run.cfg.realisations, thoughts)
+        for labels, thoughts in explicit
     ]
 
     def watch(*step: Any) -> bool:
@@ -222,14 +223,14 @@ def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[l
             raise
         raise UserError(f"{run.folder}: {_OTHER} ({error})") from error
     _check_same(
-        run, pd.concat(walked, ignore_index=True), [own for part, _ in asked for own in part]
+        run, pd.concat(walked, ignore_index=True), [own for part, _ in explicit for own in part]
     )
     return [
         [
-            recorder.trace(str(row["room"]), int(rows[label]), row)
+            recorder.trace(str(row["scene"]), int(rows[label]), row)
             for label, row in zip(labels, _records(run, labels), strict=True)
         ]
-        for recorder, (labels, _) in zip(recorders, asked, strict=True)
+        for recorder, (labels, _) in zip(recorders, explicit, strict=True)
     ]
 
 
@@ -250,7 +251,7 @@ def _walk(
 
 
 def _by_room(run: Run, rows: pd.Series, labels: Sequence[int]) -> dict[str, list[int]]:
-    own = run.episodes.loc[list(labels), "room"]
+    own = run.episodes.loc[list(labels), "scene"]
     return {str(room): rows.loc[part.index].tolist() for room, part in own.groupby(own)}
 
 
@@ -261,7 +262,7 @@ def _records(run: Run, labels: Sequence[int]) -> list[Mapping[str, Any]]:
 
 def _check_same(run: Run, walked: pd.DataFrame, labels: Sequence[int]) -> None:
     """Raise `UserError` unless the episodes of `labels` went as the run's records say."""
-    keys = ["room", "sound", "episode"]
+    keys = ["scene", "sound", "episode"]
     own = run.episodes.loc[sorted(set(labels))]
     again = own[keys].merge(walked, on=keys, how="left")[list(own.columns)]
     try:

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from avn.core.errors import UserError
-from avn.core.files import stage_folder, written_whole
+from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest
-from avn.core.progress import tell
+from avn.core.progress import log
 from avn.navigation.trace import Trace
 from avn.pipeline import replay
 from avn.pipeline.observed import Perceived, soundtrack
@@ -52,11 +52,11 @@ def write_page(
     )
     path = output or default.with_name(default.name + ".html")
     try:
-        with written_whole(path) as part:
+        with atomic_write(path) as part:
             part.write_text(html, encoding="utf-8")
     except OSError as error:
         raise UserError(f"--output: {path}: {error.strerror}; choose another place") from error
-    tell(f"{len(html) / 1e6:.1f} MB")
+    log(f"{len(html) / 1e6:.1f} MB")
     return path
 
 
@@ -81,7 +81,7 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
     pages = []
     for index, (run, labels) in enumerate(zip(runs, _chosen(runs, count, show), strict=True)):
         if labels or paths:
-            tell(f"{run.folder}: walking {'all' if paths else len(labels)} episodes again")
+            log(f"{run.folder}: walking {'all' if paths else len(labels)} episodes again")
         # the runs of several seeds taken together stand first
         embedded, ways = media.add(run, len(groups) + index, labels, paths)
         pages.append(
@@ -146,7 +146,7 @@ def _chosen(runs: Sequence[Run], count: int, show: str) -> Iterator[list[int]]:
     for run in runs:
         keys = dict(zip(run.episodes.index, replay.episode_keys(run.episodes), strict=True))
         labels: list[int] = []
-        for _, part in run.episodes.groupby(["room", "sound"], sort=False):
+        for _, part in run.episodes.groupby(["scene", "sound"], sort=False):
             shared = [int(label) for label in part.index if keys[label] in chosen]
             each = [replay.choose(part, word, count) for word in show.split(",")]
             labels += shared or list(dict.fromkeys(label for own in each for label in own))
@@ -157,7 +157,9 @@ def _chosen(runs: Sequence[Run], count: int, show: str) -> Iterator[list[int]]:
 def _settings(run: Run) -> str:
     cfg = run.cfg
     parts = {key: cfg[key].name for key in ("protocol", "acoustics", "split", "mapper", "planner")}
-    parts |= {key: cfg[key] for key in ("look", "exploration", "localisation", "part", "episodes")}
+    parts |= {
+        key: cfg[key] for key in ("look", "exploration", "localisation", "subset", "episodes")
+    }
     parts["train_seed"] = cfg.train_seed
     return ", ".join(f"{key}={value}" for key, value in parts.items())
 

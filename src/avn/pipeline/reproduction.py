@@ -11,13 +11,13 @@ import pandas as pd
 from omegaconf import DictConfig
 
 from avn.core.errors import UserError
-from avn.core.files import stage_folder, written_whole
+from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest
-from avn.core.progress import span, tell
+from avn.core.progress import format_duration, log
 from avn.pipeline.dashboard import Dashboard
 from avn.pipeline.run import RESULTS, Evaluation, agent_label, read_run
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import make, missing, refusal, spent
+from avn.pipeline.stage import make, missing, missing_error, spent
 from avn.reporting import published, results, table
 from avn.reporting.table import PAPER_PROTOCOL
 
@@ -82,17 +82,17 @@ def _walk(configs: Sequence[DictConfig]) -> list[Path]:
     steps = missing(runs)
     for stage in steps:
         if not (stage.cfg.auto or isinstance(stage, Evaluation)):
-            raise refusal(stage)
-        tell(f"to make: {stage.title} (about {span(stage.seconds())})")
+            raise missing_error(stage)
+        log(f"to make: {stage.title} (about {format_duration(stage.seconds())})")
     if steps:
-        tell(f"all in all about {span(sum(stage.seconds() for stage in steps))}")
+        log(f"all in all about {format_duration(sum(stage.seconds() for stage in steps))}")
     paper = published.paper_averages() if configs[0].protocol.name == PAPER_PROTOCOL else {}
     rows = dict.fromkeys(cfg.agent.name for cfg in configs)
     with Dashboard([(s.title, s.seconds()) for s in steps], list(rows), paper) as board:
         table = _Rows(runs, board)
         table.fill()
         for stage in steps:
-            make(stage, asked=isinstance(stage, Evaluation))
+            make(stage, explicit=isinstance(stage, Evaluation))
             board.made()
             table.fill()
     return [run.folder for run in runs]
@@ -115,14 +115,14 @@ class _Rows:
             folders.append(run.folder)
             self._board.fill(row, _average(folders))
             if row not in [own.cfg.agent.name for own in self._left]:
-                passed = span(time.monotonic() - self._started)
-                tell(f"{row}: {_average(folders)} after {passed}")
+                passed = format_duration(time.monotonic() - self._started)
+                log(f"{row}: {_average(folders)} after {passed}")
 
 
 def _average(folders: Sequence[Path]) -> str:
     """Success rate and SPL of some runs, over all sounds and rooms."""
     runs = pd.concat([read_run(folder)[0] for folder in folders])
-    average = runs[runs["room"] == results.AVERAGE]
+    average = runs[runs["scene"] == results.AVERAGE]
     every = average[average["sound"] == results.ALL_SOUNDS]
     mean = 100.0 * (every if len(every) else average)[["sr", "spl"]].mean()
     return f"{mean['sr']:.1f} / {mean['spl']:.1f}"
@@ -153,26 +153,26 @@ def _write(
         (TABLE, published.markdown(cells, sounds, privileged)),
         (LATEX, published.latex(cells, sounds, privileged)),
     ):
-        with written_whole(target / name) as part:
+        with atomic_write(target / name) as part:
             part.write_text(text, encoding="utf-8")
     seconds = pd.DataFrame({"stage": list(spent), "seconds": list(spent.values())})
     if len(seconds):  # a table that was all there already says nothing new
         seconds = seconds.sort_values("seconds", ascending=False).round(1)
         results.write_csv(seconds, target / SECONDS)
         for row in seconds.itertuples():
-            tell(f"{row.seconds:7.0f} s  {row.stage}")
+            log(f"{row.seconds:7.0f} s  {row.stage}")
 
 
 def _compare(episodes: pd.DataFrame) -> None:
     """Print how much better each row is than the one before it, over the same episodes."""
     rows = list(dict.fromkeys(episodes["agent"]))
     figures = [*results.FIGURES.values()]
-    keys = ["agent", "sound", "room", "seed", "episode", "source", "start_cell", "start_heading"]
+    keys = ["agent", "sound", "scene", "seed", "episode", "source", "start_cell", "start_heading"]
     mean = episodes.groupby(keys, as_index=False)[figures].mean()  # over networks
     for one, other in zip(rows[1:], rows, strict=False):
         differences = results.compare(mean[mean["agent"] == one], mean[mean["agent"] == other])
         spl = differences.set_index("figure").loc["spl"] * 100
-        tell(
+        log(
             f"{one} less {other}: SPL {spl['difference']:+.1f} points "
             f"(95 % interval {spl['low']:+.1f} to {spl['high']:+.1f})"
         )

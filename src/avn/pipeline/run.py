@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 from torch.utils.tensorboard import SummaryWriter
 
-from avn.agents.rollout import Labels, Watch, walk_room
+from avn.agents.rollout import Labels, Watch, rollout_scene
 from avn.apartments.splits import PARTS
+from avn.core.classes import build_object
 from avn.core.errors import UserError
-from avn.core.files import check_name, written_whole
+from avn.core.files import atomic_write, check_name
 from avn.dataset.scene import Scene
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
 from avn.navigation.exploration import EXPLORATIONS
@@ -43,12 +43,12 @@ EPISODES = ("frozen", "exhaustive")
 
 def wanted_by(cfg: DictConfig) -> tuple[str, ...]:
     """The observations that the agent of a config cannot do without."""
-    return build_agent(cfg).wants(instantiate(cfg.protocol))
+    return build_agent(cfg).wants(build_object("protocol", cfg.protocol))
 
 
 def agent_label(cfg: DictConfig) -> str:
     """The name of the config's agent in tables; it tells which parts of the truth it is given."""
-    return "-true-".join((cfg.agent.name, *cfg.agent.truth))
+    return "-true-".join((cfg.agent.name, *cfg.agent.oracle_inputs))
 
 
 class Evaluation(Stage):
@@ -61,7 +61,7 @@ class Evaluation(Stage):
     @property
     def apartments(self) -> Apartments:
         """The apartments in which it walks."""
-        return Apartments(self.cfg, self.cfg.part)
+        return Apartments(self.cfg, self.cfg.subset)
 
     @property
     def geometry(self) -> Geometry:
@@ -71,13 +71,13 @@ class Evaluation(Stage):
     @property
     def observed(self) -> Observed:
         """What its agent observes there."""
-        return Observed(self.apartments, wanted_by(self.cfg), truth=self.cfg.agent.truth)
+        return Observed(self.apartments, wanted_by(self.cfg), truth=self.cfg.agent.oracle_inputs)
 
     def needs(self) -> Sequence[Stage]:
         """Geometry, what makes the observations, and the networks of the agent."""
         stages = self.observed.stages
         # its prior stands beside what it says of free cells
-        prior = [OccupancyNetwork(self.cfg)] if "window" in stages else []
+        prior = [OccupancyNetwork(self.cfg)] if "local_patch" in stages else []
         return (self.geometry, *stages.values(), *agent_stages(self.cfg), *prior)
 
     def settings(self) -> Sequence[str]:
@@ -99,16 +99,16 @@ class Evaluation(Stage):
         """What makes no difference to this agent under these rules."""
         radius = () if self.cfg.protocol.goal == "radius" else ("protocol.radius",)
         frozen = self.cfg.episodes == "frozen"
-        lists = () if frozen else ("protocol.starts", "protocol.exploration")
+        lists = () if frozen else ("protocol.num_starts", "protocol.exploration_steps")
         return (*agent_ignored(self.cfg), *radius, *lists)
 
     @property
     def _walks_first(self) -> bool:
-        return self.cfg.episodes == "frozen" and self.cfg.protocol.exploration > 0
+        return self.cfg.episodes == "frozen" and self.cfg.protocol.exploration_steps > 0
 
     def consulted(self) -> Sequence[str]:
         """The part, sounds by their recordings, and what is made of a finished run."""
-        return ("part", "sound", "film", "film_show")
+        return ("subset", "sound", "film", "film_show")
 
     def content(self) -> Any:
         """The recordings."""
@@ -139,23 +139,25 @@ class Evaluation(Stage):
             raise UserError(f"seed: {cfg.seed} is out of range; give 0 or more")
         for key, known in (
             ("episodes", EPISODES),
-            ("part", PARTS),
+            ("subset", PARTS),
             ("exploration", EXPLORATIONS),
         ):
             if cfg[key] not in known:
                 raise UserError(f"{key}: '{cfg[key]}' is none of {', '.join(known)}")
-        instantiate(cfg.protocol)  # rules that contradict themselves are refused first
+        build_object("protocol", cfg.protocol)  # rules that contradict themselves are refused first
         agent = build_agent(cfg)
         if agent.privileged != cfg.agent.privileged:
             raise UserError(
                 f"agent.privileged: {cfg.agent.privileged}, but '{type(agent).__name__}' is "
                 f"{'' if agent.privileged else 'not '}shown the truth; say so in the row"
             )
-        self.observed.check(type(agent).__name__, agent.wants(instantiate(cfg.protocol)))
+        self.observed.check(
+            type(agent).__name__, agent.wants(build_object("protocol", cfg.protocol))
+        )
         if agent.explores and not self._walks_first:
             raise UserError(
                 f"episodes: agent {type(agent).__name__} explores first, and these episodes have "
-                "no exploration walk; take episodes=frozen and protocol.exploration=400"
+                "no exploration walk; take episodes=frozen and protocol.exploration_steps=400"
             )
         check_agent(cfg, agent)
         dry_sounds(cfg)  # a bad file is refused before anything is made
@@ -169,12 +171,12 @@ class Evaluation(Stage):
         cfg, folder, rooms = self.cfg, self.folder, self.geometry.load()
         observations = self.observed.load(rooms)
         episodes = pd.concat(walk_rooms(cfg, rooms, observations), ignore_index=True)
-        protocol: Protocol = instantiate(cfg.protocol)
+        protocol: Protocol = build_object("protocol", cfg.protocol)
         walks = [episodes_of(cfg, room, protocol).walks for room in rooms]
         perception_tables.write(self.observed, rooms, walks, observations, folder)
         summary = results.summarise(episodes)
         _log(cfg, folder, summary)
-        with written_whole(folder / "config.yaml") as part:
+        with atomic_write(folder / "config.yaml") as part:
             OmegaConf.save(cfg, part, resolve=True)
         results.write_csv(episodes, folder / EPISODE_RECORDS)
         results.write_csv(summary, folder / RESULTS)
@@ -201,7 +203,7 @@ def walk_rooms(
     list of DataFrame
         The records of each room.
     """
-    protocol: Protocol = instantiate(cfg.protocol)
+    protocol: Protocol = build_object("protocol", cfg.protocol)
     agent = build_agent(cfg, ready=True)
     labels = Labels(
         agent=agent_label(cfg),
@@ -209,7 +211,7 @@ def walk_rooms(
         look=cfg.look if cfg.planner._target_ else "once",
     )
     return [
-        walk_room(agent, room, episodes_of(cfg, room, protocol), protocol, labels, own, watch)
+        rollout_scene(agent, room, episodes_of(cfg, room, protocol), protocol, labels, own, watch)
         for room, own in zip(rooms, observations, strict=True)
     ]
 
@@ -253,13 +255,13 @@ def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
     settings |= {key: cfg[key].name for key in ("sound_model", "mapper", "planner")}
     settings |= {"seed": cfg.seed, "train_seed": cfg.train_seed, "episodes": cfg.episodes}
     settings |= {key: cfg[key] for key in ("look", "exploration", "localisation")}
-    settings |= {"part": cfg.part}
+    settings |= {"subset": cfg.subset}
     if "source" in cfg.planner:
-        settings["source"] = cfg.planner.source
+        settings["source_filter"] = cfg.planner.source_filter
     settings["sounds"] = "-".join(sound_files(cfg))
     figures = results.headline(summary)
     with SummaryWriter(str(folder)) as writer:
         for row in summary.itertuples():
             for name in figures:
-                writer.add_scalar(f"{name}/{row.sound}/{row.room}", getattr(row, name), cfg.seed)
+                writer.add_scalar(f"{name}/{row.sound}/{row.scene}", getattr(row, name), cfg.seed)
         writer.add_hparams(settings, figures, run_name=".")

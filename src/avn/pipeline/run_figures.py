@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from torch.utils.tensorboard import SummaryWriter
 
 from avn.core.errors import UserError
-from avn.core.files import written_whole
-from avn.core.progress import tell
+from avn.core.files import atomic_write
+from avn.core.progress import log
 from avn.navigation.trace import Trace
 from avn.pipeline import replay
 from avn.pipeline.replay import Run
@@ -51,7 +51,7 @@ def draw_runs(runs: Sequence[Run], show: str, count: int, episodes: Sequence[int
         walked = [replay.traces(run, replay.same_episodes(first, labels, run)) for run in runs]
         made |= episode_figures(walked, names)
     else:
-        tell(f"{first.folder}: no episode to show (--show {show})")
+        log(f"{first.folder}: no episode to show (--show {show})")
     write_figures(first.folder, made)
 
 
@@ -78,7 +78,7 @@ def episode_figures(walked: Sequence[Sequence[Trace]], names: Sequence[str]) -> 
                 figure = draw(trace, names[0])
             except ValueError:
                 continue  # an agent without this part
-            made[f"{kind}-{record['room']}-{record['sound']}-{record['episode']}"] = figure
+            made[f"{kind}-{record['scene']}-{record['sound']}-{record['episode']}"] = figure
     return made
 
 
@@ -89,7 +89,7 @@ def write_figures(folder: Path, made: dict[str, Figure]) -> None:
     with SummaryWriter(str(folder), filename_suffix=_SUFFIX) as writer:
         for name, figure in made.items():
             path = folder / FOLDER / f"{name}.png"
-            with written_whole(path) as part:
+            with atomic_write(path) as part:
                 figure.savefig(part, format="png", metadata={"Software": None})
-            tell(str(path))
+            log(str(path))
             writer.add_figure(f"figures/{name.replace('-', '/', 1)}", figure)

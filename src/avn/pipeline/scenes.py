@@ -22,8 +22,8 @@ from avn.pipeline.apartments import (
 )
 
 # Settings of an acoustic regime; all others shape the reverberation, which regimes share.
-_REGIME = ("name", "first_arrival")
-_HEIGHTS = ("ear_height", "source_height")
+_REGIME = ("name", "direct_path")
+_HEIGHTS = ("receiver_height", "source_height")
 
 
 def acoustics_of(apartments: Apartments) -> AcousticsConfig:

@@ -8,8 +8,8 @@ import torch
 from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig
 
+from avn.core.classes import build_object
 from avn.datamodules.sound import SoundData
-from avn.modules.network import build_part
 from avn.modules.sound_cnn import SoundCnn
 from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.trained_on_clips import TrainedOnClips
@@ -37,7 +37,7 @@ class SoundNetwork(TrainedOnClips):
     def untrained(self) -> SoundCnn:
         """The network before training."""
         torch.manual_seed(self.cfg.sound_model.train_seed)
-        model: SoundCnn = build_part(self.cfg.sound_model)
+        model: SoundCnn = build_object("sound_model", self.cfg.sound_model)
         return model
 
     def data(self) -> SoundData:

@@ -21,7 +21,7 @@ from omegaconf import DictConfig
 from avn.core.errors import UserError
 from avn.core.files import locked
 from avn.core.hashing import digest
-from avn.core.progress import span, tell
+from avn.core.progress import format_duration, log
 from avn.core.settings import leaves, values
 
 # What every stage reads besides its own settings; none of it changes a product.
@@ -186,12 +186,12 @@ def _ordered(stages: Iterable[Stage], instead: Mapping[str, Stage]) -> list[Stag
     return list(found.values())
 
 
-def build(stage: Stage, asked: bool = False) -> None:
+def build(stage: Stage, explicit: bool = False) -> None:
     """Make a stage and what it needs, as far as it is missing.
 
     Parameters
     ----------
-    asked : bool
+    explicit : bool
         Whether it is this product that the user asked for: then `auto=false`, which refuses to
         make what is missing, does not refuse this one.
 
@@ -201,30 +201,30 @@ def build(stage: Stage, asked: bool = False) -> None:
         Where something is missing and `auto` is false, or settings cannot work.
     """
     for own in missing([stage]):
-        make(own, asked=asked and own.fingerprint == stage.fingerprint)
+        make(own, explicit=explicit and own.fingerprint == stage.fingerprint)
 
 
-def make(stage: Stage, asked: bool = False) -> None:
+def make(stage: Stage, explicit: bool = False) -> None:
     """Make a stage whose needs are there, unless it is done or another process makes it."""
     if stage.done():
         return
-    if not (stage.cfg.auto or asked):
-        raise refusal(stage)
+    if not (stage.cfg.auto or explicit):
+        raise missing_error(stage)
     with ExitStack() as held:
         for path in stage.locks():
             held.enter_context(locked(path, stage.title))
         if stage.done():
             return
-        about = f" (about {span(stage.seconds())})" if stage.seconds() else ""
-        tell(f"{stage.title} is missing: making it{about}")
+        about = f" (about {format_duration(stage.seconds())})" if stage.seconds() else ""
+        log(f"{stage.title} is missing: making it{about}")
         started = time.perf_counter()
         stage.make()
         took = time.perf_counter() - started
         spent[stage.title] = spent.get(stage.title, 0.0) + took
-        tell(f"{stage.title} made in {span(took)}: {stage.folder}")
+        log(f"{stage.title} made in {format_duration(took)}: {stage.folder}")
 
 
-def refusal(stage: Stage) -> UserError:
+def missing_error(stage: Stage) -> UserError:
     """The error where something is missing that must not be made."""
     return UserError(
         f"{stage.folder}: {stage.title} is missing and auto=false; leave auto=true to make it"

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import torch
-from hydra.utils import instantiate
 from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig
 
+from avn.core.classes import build_object
 from avn.core.progress import progress_bar
 from avn.datamodules.stop import StopData
-from avn.modules.network import build_part
 from avn.modules.stop_classifier import StopClassifier, check_decision
 from avn.modules.stop_metrics import CRITERIA, StopScores, best_threshold
 from avn.navigation.protocols import Protocol
@@ -57,12 +56,12 @@ class StopNetwork(TrainedOnClips):
 
     def untrained(self) -> StopClassifier:
         """The network before training."""
-        model: StopClassifier = build_part(self.cfg.stop_model)
+        model: StopClassifier = build_object("stop_model", self.cfg.stop_model)
         return model
 
     def data(self) -> StopData:
         """Clips and how many moves the goal is away."""
-        protocol: Protocol = instantiate(self.cfg.protocol)
+        protocol: Protocol = build_object("protocol", self.cfg.protocol)
         return StopData(
             **self.clips(), goal=lambda scene: protocol.goal_cells(scene.grid, scene.sources)
         )

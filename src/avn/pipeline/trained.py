@@ -12,7 +12,7 @@ import lightning as L
 from lightning.pytorch.callbacks import Callback
 
 from avn.core.errors import UserError
-from avn.core.files import stage_folder, written_whole
+from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import file_hash
 from avn.modules import training
 from avn.modules.network import Network
@@ -67,7 +67,7 @@ class Trained(Stage):
     def finish(self, metrics: dict[str, Any], recipe: dict[str, Any]) -> None:
         """Write `metrics.json` and the model card, which end a training."""
         metrics = metrics | {CHECKSUM: file_hash(self.folder / training.BEST)}
-        with written_whole(self.folder / METRICS) as part:
+        with atomic_write(self.folder / METRICS) as part:
             part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
         write_card(self.folder, self.title, self._setting(), recipe, metrics)
 

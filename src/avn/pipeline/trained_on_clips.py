@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
+from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.pipeline.apartments import TRAINING
@@ -60,6 +61,6 @@ class TrainedOnClips(Fitted):
             "train": train,
             "validation": validation,
             "sounds": dry_sounds(self.cfg, TRAINING),
-            "microphone": typed(self.train.node("microphone")),
+            "microphone": build_object("microphone", self.train.node("microphone")),
             "recipe": typed(self.cfg[self.node]),
         }

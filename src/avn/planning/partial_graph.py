@@ -22,25 +22,25 @@ class GraphRules:
 
     Attributes
     ----------
-    blocked_below : float
+    obstacle_threshold : float
         Squares that are believed to be free by less than this are no nodes; at most 0.5, so that
         unknown squares are.
-    detour : float
+    collision_cost : float
         Moves that running into a blocked square costs, so that entering a square that is free by
         p costs 1 + detour (1 - p).
     """
 
-    blocked_below: float = 0.5
-    detour: float = 0.0
+    obstacle_threshold: float = 0.5
+    collision_cost: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 <= self.blocked_below <= 0.5:
+        if not 0 <= self.obstacle_threshold <= 0.5:
             raise UserError(
-                f"planner.blocked_below: {self.blocked_below}; give 0 to 0.5, for an unknown "
-                "square is believed to be free by 0.5 and must be a node"
+                f"planner.obstacle_threshold: {self.obstacle_threshold}; give 0 to 0.5, for an "
+                "unknown square is believed to be free by 0.5 and must be a node"
             )
-        if not 0 <= self.detour <= 1000:
-            raise UserError(f"planner.detour: {self.detour}; give moves, 0 to 1000")
+        if not 0 <= self.collision_cost <= 1000:
+            raise UserError(f"planner.collision_cost: {self.collision_cost}; give moves, 0 to 1000")
 
 
 class PartialGraph:
@@ -63,7 +63,7 @@ class PartialGraph:
     def __init__(self, n: int, size: int, rules: GraphRules) -> None:
         self.rules = rules
         self.cost: NDArray[np.float32] = np.full(
-            (n, size, size), 1 + 0.5 * rules.detour, dtype=np.float32
+            (n, size, size), 1 + 0.5 * rules.collision_cost, dtype=np.float32
         )
         self.walls: NDArray[np.uint8] = np.zeros((n, size, size), dtype=np.uint8)
 
@@ -79,8 +79,8 @@ class PartialGraph:
         rows : (N,) int64 tensor, optional
             Whose maps, where not those of all agents.
         """
-        costs = 1 + self.rules.detour * (1 - belief)
-        costs = torch.where(belief < self.rules.blocked_below, torch.inf, costs)
+        costs = 1 + self.rules.collision_cost * (1 - belief)
+        costs = torch.where(belief < self.rules.obstacle_threshold, torch.inf, costs)
         flat = self.cost.reshape(len(self.cost), -1)
         chosen = np.arange(len(flat)) if rows is None else rows.numpy()
         flat[chosen[:, None], squares.numpy()] = costs.numpy()

@@ -55,7 +55,7 @@ def first_actions(
         What a step backward costs more than one forward; infinite for none.
     running : (N,) bool
         Whose action is asked for.
-    reach : int
+    stop_probability : int
         A path may end so many squares from its target, diagonals included.
 
     Returns

@@ -50,7 +50,7 @@ def breakdown(episodes: pd.DataFrame, kind: str, draws: int = 1000) -> pd.DataFr
     rows = []
     for name, part in episodes.groupby(_groups(episodes, kind), observed=True):
         values = part[["success", "spl"]].to_numpy(dtype=np.float64)
-        clusters = part.groupby(["room", "source"]).ngroup().to_numpy()
+        clusters = part.groupby(["scene", "source"]).ngroup().to_numpy()
         means = values.mean(axis=0)
         low, high = cluster_bootstrap(values, clusters, draws=draws)
         row: dict[str, object] = {"group": str(name), "episodes": len(part)}

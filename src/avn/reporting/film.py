@@ -21,7 +21,7 @@ from torch import Tensor
 from avn.acoustics.dry_sounds import RATE
 from avn.core.actions import HEADINGS
 from avn.core.errors import UserError
-from avn.core.files import written_whole
+from avn.core.files import atomic_write
 from avn.modules.spectrogram import Spectrogram
 from avn.navigation.trace import Thoughts, Trace
 from avn.reporting.sound_figures import draw_plan
@@ -61,7 +61,7 @@ def write_film(
     UserError
         Where it cannot be encoded.
     """
-    with written_whole(path) as part, tempfile.TemporaryDirectory() as folder:
+    with atomic_write(path) as part, tempfile.TemporaryDirectory() as folder:
         wave = Path(folder) / "sound.wav"
         soundfile.write(wave, track, RATE, subtype="PCM_16")
         writer = imageio_ffmpeg.write_frames(

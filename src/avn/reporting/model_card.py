@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from avn.core.files import written_whole
+from avn.core.files import atomic_write
 
 CARD = "model_card.md"
 # Headings after Mitchell et al., "Model cards for model reporting" (FAT* 2019), where they apply.
@@ -47,5 +47,5 @@ def write_card(
     text = yaml.safe_dump(dict(recipe), sort_keys=True, allow_unicode=True)
     lines += ["", "## Recipe", "", "```yaml", text.rstrip(), "```"]
     lines += ["", "## Limits", "", _LIMITS, "", "## Licence", "", "Apache-2.0, as the code.", ""]
-    with written_whole(folder / CARD) as part:
+    with atomic_write(folder / CARD) as part:
         part.write_text("\n".join(lines), encoding="utf-8")

@@ -76,7 +76,7 @@ def render(
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
     )
-    named = dict.fromkeys(room for run in runs for room in run.results["room"])
+    named = dict.fromkeys(room for run in runs for room in run.results["scene"])
     rooms = [*(room for room in named if room != AVERAGE), AVERAGE]
     rows = [row for index, run in enumerate(runs) for row in _rows(index, run, rooms)]
     data = {
@@ -133,14 +133,14 @@ def _rows(index: int, run: PageRun, rooms: Sequence[str]) -> list[dict[str, Any]
     paper = _paper()
     rows = []
     for sound, part in run.results.groupby("sound", sort=False):
-        own = {str(row["room"]): row for row in part.to_dict("records")}
+        own = {str(row["scene"]): row for row in part.to_dict("records")}
         cells: list[dict[str, Any] | None] = []
         for room in rooms:
             if room not in own:
                 cells.append(None)
                 continue
             found, key = own[room], (str(own[room]["agent"]), str(own[room]["protocol"]))
-            cell: dict[str, Any] = {"room": room, "paper": paper.get((*key, str(sound), room))}
+            cell: dict[str, Any] = {"scene": room, "paper": paper.get((*key, str(sound), room))}
             for figure in ("sr", "spl"):
                 cell[figure] = round(100 * found[figure], 2)
                 for end in _ENDS:
@@ -164,7 +164,7 @@ def _spread(run: PageRun, sound: str, room: str) -> tuple[float, float] | None:
     """Standard deviation of success rate and SPL over the seeds, in points."""
     if run.seeds is None:
         return None
-    chosen = (run.seeds["sound"] == sound) & (run.seeds["room"] == room)
+    chosen = (run.seeds["sound"] == sound) & (run.seeds["scene"] == room)
     row = run.seeds[chosen].iloc[0]
     return 100 * float(row["sr_std"]), 100 * float(row["spl_std"])
 
@@ -193,10 +193,10 @@ def _breakdown(runs: Sequence[PageRun]) -> str:
 def _paper() -> dict[tuple[str, ...], tuple[float, float]]:
     """The paper's success rate and SPL by agent, protocol, sound and room."""
     table = paper_table()
-    means = table.groupby(["agent", "room"], as_index=False)[["sr", "spl"]].mean()
+    means = table.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
     table = pd.concat([table, means.assign(sound=ALL_SOUNDS)])
     return {
-        (row["agent"], PAPER_PROTOCOL, row["sound"], row["room"]): (row["sr"], row["spl"])
+        (row["agent"], PAPER_PROTOCOL, row["sound"], row["scene"]): (row["sr"], row["spl"])
         for row in table.to_dict("records")
     }
 
@@ -205,7 +205,7 @@ def _episodes(run: PageRun) -> list[list[Any]]:
     """A run's episodes as the script lists them."""
     return [
         [
-            str(row["room"]),
+            str(row["scene"]),
             str(row["sound"]),
             int(row["episode"]),
             float(row["geodesic"]),

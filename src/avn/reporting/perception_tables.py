@@ -37,7 +37,7 @@ def windows_table(seen: pd.DataFrame) -> Table:
     """
     columns = ("ROC AUC", "accuracy", "calibration error")
     table = _table("which cells look free", columns)
-    for row in seen[seen["room"] == "all"].to_dict("records"):
+    for row in seen[seen["scene"] == "all"].to_dict("records"):
         label = f"{row['by']}, {row['cells']} cells"
         table.add_row(
             label, f"{row['auc']:.3f}", f"{100 * row['accuracy']:.1f} %", f"{row['ece']:.3f}"

@@ -37,7 +37,7 @@ def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
         intervals over (room, source) clusters of all their episodes together; `sr_std` and
         `spl_std`, the spread over seeds; `paper_sr` and `paper_spl`, NaN where the paper has none.
     """
-    keys = [*LABELS, "sound", "room"]
+    keys = [*LABELS, "sound", "scene"]
     intervals = summarise(episodes.assign(seed=_POOLED))
     ends = [f"{figure}_{end}" for figure in ("sr", "spl") for end in ENDS]
     spread = across_seeds(runs)[[*keys, "sr", "spl", "sr_std", "spl_std"]]
@@ -45,16 +45,16 @@ def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
     percent = ["sr", "spl", "sr_std", "spl_std", *ends]
     found[percent] *= 100.0
     paper = paper_table()
-    means = paper.groupby(["agent", "room"], as_index=False)[["sr", "spl"]].mean()
+    means = paper.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
     paper = pd.concat([paper, means.assign(sound=ALL_SOUNDS)]).assign(protocol=PAPER_PROTOCOL)
     paper = paper.rename(columns={"sr": "paper_sr", "spl": "paper_spl"})
-    return found.merge(paper, on=["agent", "protocol", "sound", "room"], how="left", sort=False)
+    return found.merge(paper, on=["agent", "protocol", "sound", "scene"], how="left", sort=False)
 
 
 def paper_averages() -> dict[str, str]:
     """The paper's success rate and SPL of each row, over all sounds and rooms."""
     paper = paper_table()
-    average = paper[paper["room"] == AVERAGE].groupby("agent")[["sr", "spl"]].mean()
+    average = paper[paper["scene"] == AVERAGE].groupby("agent")[["sr", "spl"]].mean()
     return {
         str(row): _pair(*figures)
         for row, figures in zip(average.index, average.to_numpy(), strict=True)
@@ -63,7 +63,7 @@ def paper_averages() -> dict[str, str]:
 
 def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
     """The table for a terminal; agents named in `privileged` are marked as bounds."""
-    rooms = list(dict.fromkeys(cells["room"]))
+    rooms = list(dict.fromkeys(cells["scene"]))
     title = f"success rate / SPL, % ({_settings(cells)})"
     table = Table(title=title, box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
@@ -88,7 +88,7 @@ def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[
         "",
     ]
     for sound, part in _by_sound(cells, sounds):
-        rooms = list(dict.fromkeys(part["room"]))
+        rooms = list(dict.fromkeys(part["scene"]))
         text += [f"### {sound}", "", f"| | {' | '.join(_cell_safe(readable(r)) for r in rooms)} |"]
         text.append("| --- " * (1 + len(rooms)) + "|")
         for agent, own in part.groupby("agent", sort=False):
@@ -101,7 +101,7 @@ def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[
 
 def latex(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str] = ()) -> str:
     """The same as one `tabular` with a `\\shortstack` in each cell."""
-    rooms = list(dict.fromkeys(cells["room"]))
+    rooms = list(dict.fromkeys(cells["scene"]))
     text = [f"% success rate / SPL in %: {_settings(cells)}"]
     text += ["\\begin{tabular}{ll" + "c" * len(rooms) + "}", "\\hline"]
     heads = ["Sound", "Agent", *(_escaped(readable(room)) for room in rooms)]
@@ -141,7 +141,7 @@ def _by_sound(cells: pd.DataFrame, sounds: Sequence[str]) -> list[tuple[str, pd.
 
 def _in_rooms(part: pd.DataFrame, rooms: list[str]) -> list[dict[Hashable, Any]]:
     """The cells of one agent and sound, in the order of the rooms."""
-    return part.set_index("room").reindex(rooms).to_dict("records")
+    return part.set_index("scene").reindex(rooms).to_dict("records")
 
 
 def _lines(row: dict[Hashable, Any]) -> dict[str, str]:

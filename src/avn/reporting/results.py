@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 
 from avn.core.errors import UserError
-from avn.core.files import written_whole
+from avn.core.files import atomic_write
 from avn.navigation.metrics import cluster_bootstrap
 
 LABELS = ("agent", "protocol", "acoustics", "look")
 EPISODE_COLUMNS = (
     *LABELS,
-    *("sound", "room", "seed", "episode", "start_cell", "start_heading", "source", "source_cell"),
-    *("in_sight", "rooms_crossed", "geodesic", "euclidean", "end_cell", "path", "shortest"),
+    *("sound", "scene", "seed", "episode", "start_cell", "start_heading", "source", "source_cell"),
+    *("in_sight", "rooms_crossed", "geodesic", "euclidean", "end_cell", "path_length", "shortest"),
     *("actions", "fewest_actions", "collisions", "outcome"),
     *("success", "spl", "softspl", "sna", "dtg"),
 )
@@ -23,10 +23,10 @@ EPISODE_COLUMNS = (
 # between 0 and 1; dtg is in metres.
 FIGURES = {"sr": "success", "spl": "spl", "softspl": "softspl", "sna": "sna", "dtg": "dtg"}
 INTERVALS = tuple(f"{figure}_{end}" for figure in FIGURES for end in ("low", "high"))
-RESULT_COLUMNS = (*LABELS, "sound", "room", "seed", "episodes", *FIGURES, *INTERVALS)
+RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *FIGURES, *INTERVALS)
 ALL_SOUNDS = "all"
 AVERAGE = "average"
-_PAIR = ["sound", "room", "seed", "episode"]
+_PAIR = ["sound", "scene", "seed", "episode"]
 
 
 def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
@@ -35,7 +35,7 @@ def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
     Parameters
     ----------
     episodes : DataFrame
-        Records as `avn.agents.rollout.walk_room` makes them; any number of agents, protocols,
+        Records as `avn.agents.rollout.rollout_scene` makes them; any number of agents, protocols,
         sounds, rooms and seeds.
     draws : int
         Resamples of the bootstrap.
@@ -61,9 +61,9 @@ def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
         if len(sounds) > 1:
             sounds.append((ALL_SOUNDS, run))
         for sound, part in sounds:
-            rooms = [(str(room), own) for room, own in part.groupby("room", sort=False)]
+            rooms = [(str(room), own) for room, own in part.groupby("scene", sort=False)]
             for room, own in [*rooms, (AVERAGE, part)]:
-                row = {**labels, "sound": sound, "room": room, "episodes": len(own)}
+                row = {**labels, "sound": sound, "scene": room, "episodes": len(own)}
                 rows.append(row | _figures(own, draws))
     return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
 
@@ -80,12 +80,12 @@ def _figures(episodes: pd.DataFrame, draws: int) -> dict[str, float]:
 
 def _room_weights(episodes: pd.DataFrame) -> np.ndarray:
     """Weights that sum to 1 and give every room the same share, however many episodes it has."""
-    sizes = episodes.groupby("room")["room"].transform("size").to_numpy(dtype=np.float64)
-    return 1.0 / (sizes * episodes["room"].nunique())
+    sizes = episodes.groupby("scene")["scene"].transform("size").to_numpy(dtype=np.float64)
+    return 1.0 / (sizes * episodes["scene"].nunique())
 
 
 def _clusters(episodes: pd.DataFrame) -> np.ndarray:
-    return episodes.groupby(["room", "source"]).ngroup().to_numpy()
+    return episodes.groupby(["scene", "source"]).ngroup().to_numpy()
 
 
 def headline(results: pd.DataFrame) -> dict[str, float]:
@@ -96,7 +96,7 @@ def headline(results: pd.DataFrame) -> dict[str, float]:
     ValueError
         Where the results hold more than one agent, protocol or seed.
     """
-    average = results[results["room"] == AVERAGE]
+    average = results[results["scene"] == AVERAGE]
     if len(average) > 1:
         average = average[average["sound"] == ALL_SOUNDS]
     if len(average) != 1:
@@ -113,7 +113,7 @@ def across_seeds(results: pd.DataFrame) -> pd.DataFrame:
         One row by agent, protocol, acoustics, look, sound and room: `seeds`, how many, and for
         each figure its mean and `<figure>_std`, the sample standard deviation (NaN for one seed).
     """
-    groups = results.groupby([*LABELS, "sound", "room"], sort=False)
+    groups = results.groupby([*LABELS, "sound", "scene"], sort=False)
     table = groups["seed"].nunique().rename("seeds").to_frame()
     for figure in FIGURES:
         table[figure] = groups[figure].mean()
@@ -160,11 +160,11 @@ def compare(one: pd.DataFrame, other: pd.DataFrame, draws: int = 2000) -> pd.Dat
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
     """Write a table whole or not at all."""
-    with written_whole(path) as part:
+    with atomic_write(path) as part:
         table.to_csv(part, index=False, lineterminator="\n")
 
 
 def read_csv(path: Path) -> pd.DataFrame:
     """Read a table of this module back; names stay text, also a sound called 440 or nan."""
-    names = dict.fromkeys((*LABELS, "sound", "room", "outcome"), str)
+    names = dict.fromkeys((*LABELS, "sound", "scene", "outcome"), str)
     return pd.read_csv(path, dtype=names, keep_default_na=False, na_values=[""])

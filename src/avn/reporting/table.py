@@ -34,7 +34,7 @@ def results_table(results: pd.DataFrame, privileged: Collection[str] = ()) -> Ta
     alone; its `all` is the mean over its sounds.
     Figures of several seeds are averaged. Agents named in `privileged` are marked as such.
     """
-    rooms = list(dict.fromkeys(results["room"]))
+    rooms = list(dict.fromkeys(results["scene"]))
     table = Table(title="success rate / SPL, %", box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
     for room in rooms:
@@ -46,7 +46,7 @@ def results_table(results: pd.DataFrame, privileged: Collection[str] = ()) -> Ta
         mark = " (privileged: a bound)" if names[0] in privileged else ""
         table.add_row(f"[bold]{' · '.join(names)}{mark}[/bold]")
         for sound, part in run.groupby("sound", sort=False):
-            means = 100.0 * part.groupby("room", sort=False)[["sr", "spl"]].mean()
+            means = 100.0 * part.groupby("scene", sort=False)[["sr", "spl"]].mean()
             cells = [_cell(*row) for row in means.reindex(rooms).to_numpy()]
             table.add_row(f"  {sound}", *cells)
             own = [paper.get((*names[:2], str(sound), room), "") for room in rooms]
@@ -61,20 +61,20 @@ def hardness(episodes: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        `room`; `episodes`; `other_room`, the share of starts in another room than the source;
+        `scene`; `episodes`; `other_room`, the share of starts in another room than the source;
         `out_of_sight`, the share of starts that do not see it; `detour`, the mean ratio of
         geodesic to Euclidean distance; `geodesic`, the mean in metres.
     """
     described = pd.DataFrame(
         {
-            "room": episodes["room"],
+            "scene": episodes["scene"],
             "other_room": (episodes["rooms_crossed"] > 0).astype(float),
             "out_of_sight": 1.0 - episodes["in_sight"].astype(float),
             "detour": episodes["geodesic"] / episodes["euclidean"],
             "geodesic": episodes["geodesic"],
         }
     )
-    groups = described.groupby("room", sort=False)
+    groups = described.groupby("scene", sort=False)
     table = groups.mean()
     table.insert(0, "episodes", groups.size())
     average = table.mean()
@@ -89,7 +89,7 @@ def hardness_table(episodes: pd.DataFrame) -> Table:
     table.add_column("", no_wrap=True)
     for title in ("starts", "in another room", "out of sight", "geodesic / Euclidean", "geodesic"):
         table.add_column(title, justify="right", no_wrap=True)
-    described = hardness(episodes).set_index("room")
+    described = hardness(episodes).set_index("scene")
     shares = described[["other_room", "out_of_sight", "detour", "geodesic"]].to_numpy(np.float64)
     for room, count, row in zip(described.index, described["episodes"], shares, strict=True):
         other, hidden, detour, geodesic = row
@@ -120,9 +120,9 @@ def wide_console() -> Console:
 def _paper_cells() -> dict[tuple[str, ...], str]:
     """The paper's cells by agent, protocol, sound and room."""
     table = paper_table()
-    means = table.groupby(["agent", "room"], as_index=False)[["sr", "spl"]].mean()
+    means = table.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
     table = pd.concat([table, means.assign(sound=ALL_SOUNDS)])
-    keys = zip(table["agent"], table["sound"], table["room"], strict=True)
+    keys = zip(table["agent"], table["sound"], table["scene"], strict=True)
     figures = table[["sr", "spl"]].to_numpy()
     return {
         (agent, PAPER_PROTOCOL, sound, room): _cell(*row)

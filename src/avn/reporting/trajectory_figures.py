@@ -178,7 +178,7 @@ def title_of(trace: Trace) -> str:
     record = trace.record
     sight = "in sight" if record["in_sight"] else "out of sight"
     return (
-        f"{record['room']}, {record['sound']}, episode {record['episode']}: "
+        f"{record['scene']}, {record['sound']}, episode {record['episode']}: "
         f"source {record['geodesic']:.1f} m away, {sight}"
     )
 

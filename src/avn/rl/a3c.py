@@ -1,220 +1,112 @@
-"""Asynchronous advantage actor-critic: rounds of updates, measured and kept between them.
+"""A3C, and its loss: TorchRL's returns and A2C loss, with the trunk run once.
 
 After Mnih et al., "Asynchronous methods for deep reinforcement learning" (ICML 2016).
 """
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import time
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
 import torch
-from torch.utils.tensorboard import SummaryWriter
+from tensordict import TensorDict
+from tensordict.nn import (
+    ProbabilisticTensorDictModule,
+    ProbabilisticTensorDictSequential,
+    TensorDictModule,
+)
+from torch import Tensor
+from torchrl.objectives import A2CLoss
 
-from avn.core.errors import UserError
-from avn.core.files import written_whole
-from avn.core.progress import progress_bar, tell
-from avn.rl.crew import start_crew
+from avn.rl.algorithm import Algorithm, Loss
+from avn.rl.environment import FeatureModule
 from avn.rl.networks import ActorCritic
-from avn.rl.shared import SharedState, flatten_parameters
-from avn.rl.worker import Task
-
-LAST, BEST, CURVE = "last.ckpt", "best.ckpt", "curve.json"
-# By which figure the best network is chosen.
-MONITOR = "validation/spl"
-Measure = Callable[[ActorCritic], dict[str, float]]
+from avn.rl.rollouts import advantages_and_targets, trunk_outputs
 
 
-class Training:
-    """A training that goes on where it was.
+@dataclass
+class A3C(Algorithm):
+    """Asynchronous advantage actor-critic (Mnih et al., ICML 2016).
+
+    Attributes
+    ----------
+    gae_lambda : float
+        How far ahead advantages look (Schulman et al., ICLR 2016); 1 is all steps of the batch.
+    entropy_coef : float
+        Weight of the policy's entropy.
+    value_coef : float
+        Weight of the value's loss.
+    """
+
+    gae_lambda: float = 1.0
+    entropy_coef: float = 0.1
+    value_coef: float = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.check(("gae_lambda",), lambda value: 0 <= value <= 1, "0 to 1")
+        self.check(("entropy_coef", "value_coef"), lambda value: value >= 0, "0 or more")
+
+    def build_loss(self, network: ActorCritic, features: FeatureModule) -> Loss:
+        """Build the loss of one worker."""
+        return ActorCriticLoss(network, features, self)
+
+
+class ActorCriticLoss:
+    """Policy gradient, value and entropy of a batch.
 
     Parameters
     ----------
-    task : Task
     network : ActorCritic
-        Its weights are the first ones; afterwards they are those of the last round.
-    folder : Path
-        Where checkpoints and TensorBoard's events lie.
-    measure : callable
-        Figures of a network by name, `MONITOR` among them.
-    made_from : str
-        Hash of all that the training depends on, for the checkpoints.
-
-    Raises
-    ------
-    UserError
-        Where the last checkpoint belongs to another training, or is damaged.
+    features : FeatureModule
+        Gives the observations for the numbers of the batch.
+    recipe : A3C
     """
 
-    def __init__(
-        self, task: Task, network: ActorCritic, folder: Path, measure: Measure, made_from: str
-    ) -> None:
-        self.task, self.network, self.folder = task, network, folder
-        self.measure, self.made_from = measure, made_from
-        self._weights, _ = flatten_parameters(network)
-        self.shared = SharedState.of(self._weights)
-        self.curve: list[dict[str, float]] = []
-        self._states: list[dict[str, Any]] = []
-        folder.mkdir(parents=True, exist_ok=True)
-        if (folder / LAST).is_file():
-            self._resume()
+    def __init__(self, network: ActorCritic, features: FeatureModule, recipe: A3C) -> None:
+        self.network, self.features, self.recipe = network, features, recipe
+        actor = ProbabilisticTensorDictSequential(
+            TensorDictModule(network.actor, ["joint"], ["logits"]),
+            ProbabilisticTensorDictModule(
+                ["logits"],
+                ["action"],
+                distribution_class=torch.distributions.Categorical,
+                return_log_prob=True,
+            ),
+        )
+        self._loss = A2CLoss(
+            actor,
+            TensorDictModule(network.critic, ["joint"], ["state_value"]),
+            entropy_coeff=recipe.entropy_coef,
+            critic_coeff=recipe.value_coef,
+            loss_critic_type="l2",
+            functional=False,
+        )
 
-    def run(self, rounds: int | None = None) -> list[dict[str, float]]:
-        """Train to the end, or so many rounds; gives the figures of each round.
+    def __call__(self, batch: TensorDict) -> tuple[Tensor, dict[str, float]]:
+        """The loss, and figures of it by name.
 
-        Raises
-        ------
-        UserError
-            Where a worker dies.
+        Parameters
+        ----------
+        batch : TensorDict (N, T)
+            See `avn.rl.collectors.Batches`.
         """
-        recipe = self.task.recipe
-        updates = max(1, recipe.total // (recipe.batch * recipe.workers))
-        planned = max(1, round(recipe.total / recipe.validate_every))
-        each = -(-updates // min(planned, updates))
-        last = -(-updates // each)
-        if rounds is not None:
-            last = min(last, len(self._rounds()) + rounds)
-        with SummaryWriter(str(self.folder), purge_step=self.steps + 1) as writer:
-            if not self.curve:
-                self._close_round({}, writer)
-            if len(self._rounds()) < last:
-                self._go(last, each, updates, writer)
-        return self.curve
-
-    @property
-    def steps(self) -> int:
-        """Actions that were learnt from."""
-        return int(self.shared.updates) * self.task.recipe.batch
-
-    def _rounds(self) -> list[dict[str, float]]:
-        """The rounds that were made; the curve begins with the untrained network."""
-        return self.curve[1:]
-
-    def _go(self, last: int, each: int, updates: int, writer: SummaryWriter) -> None:
-        recipe = self.task.recipe
-        crew = start_crew(self.task, self.shared, self._states)
-        try:
-            with progress_bar(self.folder.name, updates * recipe.workers, "updates") as advance:
-                shown = 0
-
-                def progress() -> None:
-                    nonlocal shown
-                    done = int(self.shared.updates)
-                    advance(done - shown)
-                    shown = done
-
-                progress()
-                for number in range(len(self._rounds()), last):
-                    started, before = time.perf_counter(), self.steps
-                    todo = min(each, updates - number * each)
-                    reports = crew.round(todo, progress)
-                    seconds = time.perf_counter() - started
-                    self._states = [state for _, state in reports]
-                    figures = _mean([found for found, _ in reports])
-                    figures["steps_per_second"] = (self.steps - before) / seconds
-                    self._close_round(figures, writer)
-        finally:
-            crew.close()
-
-    def _close_round(self, figures: dict[str, float], writer: SummaryWriter) -> None:
-        """Measure, keep the best, log, and write the checkpoint."""
-        self._weights.copy_(self.shared.weights)
-        found = {"steps": float(self.steps), **figures, **self.measure(self.network)}
-        best = max((own[MONITOR] for own in self.curve), default=float("-inf"))
-        self.curve.append(found)
-        if found[MONITOR] > best:
-            self._write(BEST, save_network(self.network, self.made_from))
-        for name, value in found.items():
-            if name != "steps":
-                group = name if "/" in name else f"train/{name}"
-                writer.add_scalar(group, value, self.steps)
-        writer.flush()
-        shared = {key: getattr(self.shared, key).clone() for key in ("weights", "moments")}
-        self._write(
-            LAST,
-            {
-                "made_from": self.made_from,
-                **shared,
-                "updates": int(self.shared.updates),
-                "workers": self._states,
-                "curve": self.curve,
-            },
-        )
-        with written_whole(self.folder / CURVE) as part:
-            part.write_text(json.dumps(self.curve, indent=1) + "\n")
-
-    def _write(self, name: str, content: dict[str, Any]) -> None:
-        with written_whole(self.folder / name) as part:
-            torch.save(content, part)
-
-    def _resume(self) -> None:
-        path = self.folder / LAST
-        kept = read_checkpoint(path, self.made_from)
-        try:
-            self.shared.weights.copy_(kept["weights"])
-            self.shared.moments.copy_(kept["moments"])
-            self.shared.updates.fill_(kept["updates"])
-            self._weights.copy_(kept["weights"])
-            self._states, self.curve = kept["workers"], kept["curve"]
-        except (KeyError, RuntimeError) as error:
-            raise _damaged(path) from error
-        tell(f"{path}: going on after {self.steps} steps")
-
-
-def save_network(network: ActorCritic, made_from: str) -> dict[str, Any]:
-    """The content of a checkpoint that holds a network alone."""
-    weights = {name: value.clone() for name, value in network.state_dict().items()}
-    shape = dataclasses.asdict(network.shape)
-    return {"made_from": made_from, "shape": shape, "network": weights}
-
-
-def load_network(network: ActorCritic, path: Path, made_from: str) -> None:
-    """Give a network the weights of a checkpoint.
-
-    Raises
-    ------
-    UserError
-        Where it is missing, damaged, or of another row or recipe.
-    """
-    kept = read_checkpoint(path, made_from)
-    try:
-        if kept["shape"] != dataclasses.asdict(network.shape):
-            raise UserError(
-                f"{path}: features or sizes are {kept['shape']}, and the config's are "
-                f"{dataclasses.asdict(network.shape)}; delete {path.parent} to train again"
+        network, recipe = self.network, self.recipe
+        joint = trunk_outputs(network, self.features, batch)
+        with torch.no_grad():
+            value = network.critic(joint)
+            advantage, target = advantages_and_targets(
+                network, self.features, batch, value, recipe.gamma, recipe.gae_lambda
             )
-        network.load_state_dict(kept["network"])
-    except (KeyError, RuntimeError, TypeError) as error:
-        raise _damaged(path) from error
-
-
-def read_checkpoint(path: Path, made_from: str) -> dict[str, Any]:
-    """A checkpoint's content; raises `UserError` where it is damaged or of another training."""
-    try:
-        kept: dict[str, Any] = torch.load(path, weights_only=True)
-        found = kept["made_from"]
-    except Exception as error:
-        raise _damaged(path) from error
-    if found != made_from:
-        raise UserError(
-            f"{path}: the checkpoint is of another row or recipe ({str(found)[:8]}, not "
-            f"{made_from[:8]}); delete {path.parent} to train again"
-        )
-    return kept
-
-
-def _damaged(path: Path) -> UserError:
-    return UserError(f"{path}: damaged; delete {path.parent} to train again")
-
-
-def _mean(figures: list[dict[str, float]]) -> dict[str, float]:
-    names = dict.fromkeys(name for own in figures for name in own)
-    found = {}
-    for name in names:
-        values = [own[name] for own in figures if name in own]
-        found[name] = sum(values) / len(values)
-    return found
+        flat = {
+            "joint": joint.flatten(0, 1),
+            "action": batch["action"].flatten(),
+            "advantage": advantage.flatten(0, 1),
+            "value_target": target.flatten(0, 1),
+        }
+        losses = self._loss(TensorDict(flat, batch_size=[batch.numel()]))
+        names = {"loss_objective": "policy", "loss_critic": "value", "loss_entropy": "bonus"}
+        total = sum(losses[key] for key in names if key in losses)
+        figures = {"loss/policy": losses["loss_objective"], "loss/value": losses["loss_critic"]}
+        if "entropy" in losses:
+            figures["entropy"] = losses["entropy"]
+        return total, {name: float(figure.detach()) for name, figure in figures.items()}

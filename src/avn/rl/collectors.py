@@ -11,7 +11,7 @@ from torch import Tensor
 from torchrl.collectors import Collector
 
 from avn.rl.environment import WalkEnv
-from avn.rl.policy import Policy, Resolving
+from avn.rl.policy import FeatureLookup, Policy
 
 _NUMBERS = ("state", "clip")
 
@@ -37,7 +37,7 @@ class TorchrlCollector:
     def __init__(self, env: WalkEnv, policy: Policy, steps: int) -> None:
         self._collector = Collector(
             env,
-            Resolving(env.features, policy),
+            FeatureLookup(env.features, policy),
             frames_per_batch=env.world.n * steps,
             total_frames=-1,
             trust_policy=True,
@@ -55,7 +55,7 @@ class TorchrlCollector:
         self._collector.reset()
 
 
-class LeanCollector:
+class TensorCollector:
     """The same loop without a TensorDict for each step."""
 
     def __init__(self, env: WalkEnv, policy: Policy, steps: int) -> None:
@@ -65,7 +65,7 @@ class LeanCollector:
     def restart(self) -> None:
         """Look at the environment anew."""
         self.env.reset_all()
-        self._seen = self.env.look()
+        self._seen = self.env.observation()
 
     def collect(self) -> TensorDict:
         """The next batch."""
@@ -76,14 +76,14 @@ class LeanCollector:
             said = self.policy.choose(self._seen | features)
             action, h, c = said["action"], said.get("h_next"), said.get("c_next")
             reward, terminated, truncated = self.env.move(action, h, c)
-            following = self.env.look()
+            following = self.env.observation()
             before.append(self._seen | said)
             done = terminated | truncated
             ended = {"terminated": terminated, "truncated": truncated, "done": done}
             after.append(following | ended | {"reward": reward})
             if bool(done.any()):
                 self.env.begin(done)
-                following = self.env.look()
+                following = self.env.observation()
             self._seen = following
         batch = _laid_out(before)
         batch["next"] = _laid_out(after)
@@ -103,5 +103,5 @@ def _laid_out(steps: list[dict[str, Tensor]]) -> TensorDict:
 _FLAGS = ("is_init", "reward", "terminated", "truncated", "done")
 COLLECTORS: dict[str, Callable[[WalkEnv, Policy, int], Batches]] = {
     "torchrl": TorchrlCollector,
-    "lean": LeanCollector,
+    "tensor": TensorCollector,
 }

@@ -13,9 +13,9 @@ from torchrl.envs import EnvBase
 
 from avn.core.errors import UserError
 from avn.mapping.ego_map import EgoMap
-from avn.navigation.tables import Tables
-from avn.navigation.world import World
-from avn.rl.explorations import Explorations
+from avn.navigation.batched_episodes import BatchedEpisodes
+from avn.navigation.scene_batch import SceneBatch
+from avn.rl.exploration_memory import ExplorationMemory
 
 # What an agent may observe beside what is heard and seen.
 OWN = ("collided", "odometry", "map")
@@ -34,7 +34,7 @@ class FeatureModule(nn.Module):
         Names in `tables.visual` and `tables.audio`.
     """
 
-    def __init__(self, tables: Tables, observes: Sequence[str]) -> None:
+    def __init__(self, tables: SceneBatch, observes: Sequence[str]) -> None:
         super().__init__()
         self.seen = [name for name in observes if name in tables.visual]
         self.heard = [name for name in observes if name in tables.audio]
@@ -60,9 +60,9 @@ class WalkEnv(EnvBase):
     ----------
     world : World
     observes : sequence of str
-        What an agent observes: names of visual observations (`feature`, `window`, ...) and of
-        audio ones (`sound`, `sound_feature`, ...) that the world's tables have, and `collided`,
-        `odometry`, `map`.
+        What an agent observes: names of visual observations (`visual_embedding`, `local_patch`,
+        ...) and of audio ones (`source_estimate`, `audio_embedding`, ...) that the world's tables
+        have, and `collided`, `odometry`, `map`.
     explorations : Explorations, optional
         The walks that episodes begin with; their memories are what `h` and `c` begin with.
     memory : int
@@ -84,9 +84,9 @@ class WalkEnv(EnvBase):
 
     def __init__(
         self,
-        world: World,
+        world: BatchedEpisodes,
         observes: Sequence[str],
-        explorations: Explorations | None = None,
+        explorations: ExplorationMemory | None = None,
         memory: int = 0,
         map_size: int = 101,
         map_width: int = 21,
@@ -137,7 +137,7 @@ class WalkEnv(EnvBase):
             self._around = self._look_around(actions)
         return outcome
 
-    def look(self) -> dict[str, Tensor]:
+    def observation(self) -> dict[str, Tensor]:
         """All that there is to know now: numbers of state and clip, own state, memory."""
         found = {"state": self.world.state, "clip": self.world.clip(), "is_init": self.is_init}
         if "collided" in self.observes:
@@ -191,7 +191,7 @@ class WalkEnv(EnvBase):
             {
                 "odometry": world.odometry(),
                 "collided": world.collided,
-                "window": world.tables.visual["window"][world.state],
+                "local_patch": world.tables.visual["local_patch"][world.state],
             },
             batch_size=[world.n],
         )
@@ -203,7 +203,7 @@ class WalkEnv(EnvBase):
     # --- what TorchRL asks for ---
 
     def _observation(self) -> TensorDict:
-        found = self.look()
+        found = self.observation()
         numbers = {"state": found.pop("state"), "clip": found.pop("clip")}
         if self.resolved:
             found |= self.features(**numbers)

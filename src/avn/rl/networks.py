@@ -19,13 +19,13 @@ _UNKNOWN = 0.5
 
 
 @dataclass(frozen=True)
-class Shape:
+class NetworkSpec:
     """What an actor-critic is built for.
 
     Attributes
     ----------
     features : dict of str to int
-        Sizes of the features by name, such as `feature` and `sound_feature`.
+        Sizes of the features by name, such as `visual_embedding` and `audio_embedding`.
     actions : int
     width : int
         Units of each layer of the trunk.
@@ -55,7 +55,7 @@ class ActorCritic(nn.Module):
     of its own and joins them. The heads see the trunk's output, and that of the LSTM beside it.
     """
 
-    def __init__(self, shape: Shape) -> None:
+    def __init__(self, shape: NetworkSpec) -> None:
         super().__init__()
         if not shape.inputs:
             raise UserError("baseline: an actor-critic needs something to see or hear")

@@ -44,7 +44,7 @@ class Policy(TensorDictModuleBase):
         return tensordict.update(self.choose(seen))
 
 
-class Resolving(TensorDictModuleBase):
+class FeatureLookup(TensorDictModuleBase):
     """A policy behind the environment's feature module: it is shown features and no numbers.
 
     Parameters

@@ -8,27 +8,27 @@ from dataclasses import dataclass
 from typing import Any
 
 import torch
+from tensordict import TensorDict
 from torch import Tensor
 
 from avn.core.random import derive
+from avn.navigation.batched_episodes import BatchedEpisodes
 from avn.navigation.protocols import Protocol
-from avn.navigation.starts import build_starts
-from avn.navigation.tables import Tables
-from avn.navigation.world import World
+from avn.navigation.scene_batch import SceneBatch
+from avn.navigation.start_sampler import build_start_sampler
+from avn.rl.algorithm import Algorithm
 from avn.rl.collectors import COLLECTORS
-from avn.rl.config import A3CConfig
 from avn.rl.environment import WalkEnv
-from avn.rl.explorations import Explorations
-from avn.rl.losses import ActorCriticLoss
-from avn.rl.networks import ActorCritic, Shape
+from avn.rl.exploration_memory import ExplorationMemory
+from avn.rl.networks import ActorCritic, NetworkSpec
 from avn.rl.policy import Policy
 from avn.rl.shared import SharedState, flatten_parameters
 
-Turn = Callable[[], AbstractContextManager[Any]]
+Lock = Callable[[], AbstractContextManager[Any]]
 
 
 @dataclass(frozen=True)
-class Task:
+class TrainingSpec:
     """What there is to learn: apartments, rules, and the network that learns.
 
     Attributes
@@ -36,7 +36,7 @@ class Task:
     tables : Tables
     protocol : Protocol
     shape : Shape
-    recipe : A3CConfig
+    recipe : Algorithm
     buffers : dict of str to tensor
         Of the network: how its features are standardised.
     map_size : int
@@ -47,10 +47,10 @@ class Task:
         Entries of the spatial memory that tell where an agent is on the map of its walk.
     """
 
-    tables: Tables
+    tables: SceneBatch
     protocol: Protocol
-    shape: Shape
-    recipe: A3CConfig
+    shape: NetworkSpec
+    recipe: Algorithm
     buffers: dict[str, Tensor]
     map_size: int = 101
     walks: Tensor | None = None
@@ -64,33 +64,33 @@ class Worker:
     ----------
     rank : int
         Number of the worker; it draws other episodes and actions than the others.
-    task : Task
+    spec : Task
     shared : SharedState
-    turn : callable
+    lock : callable
         Gives the context in which it may change the shared state.
     """
 
-    def __init__(self, rank: int, task: Task, shared: SharedState, turn: Turn) -> None:
-        recipe, shape = task.recipe, task.shape
-        self.rank, self.recipe, self.shared, self.turn = rank, recipe, shared, turn
+    def __init__(self, rank: int, spec: TrainingSpec, shared: SharedState, lock: Lock) -> None:
+        recipe, shape = spec.recipe, spec.shape
+        self.rank, self.recipe, self.shared, self.lock = rank, recipe, shared, lock
         self.network = ActorCritic(shape)
-        self.network.load_state_dict(task.buffers, strict=False)
+        self.network.load_state_dict(spec.buffers, strict=False)
         self.weights, self.gradients = flatten_parameters(self.network)
         self.updates = 0
         self.explorations = None
-        if task.walks is not None:
-            map_size = task.map_size if shape.map_channels else 0
-            self.explorations = Explorations(
-                task.tables, task.walks, map_size, shape.map_width, task.top
+        if spec.walks is not None:
+            map_size = spec.map_size if shape.map_channels else 0
+            self.explorations = ExplorationMemory(
+                spec.tables, spec.walks, map_size, shape.map_width, spec.top
             )
         visited = None if self.explorations is None else self.explorations.visited()
         seed = derive("a3c", recipe.train_seed, rank) >> 1
         self.policy = Policy(self.network, torch.Generator().manual_seed(seed ^ 1))
-        world = World(
-            task.tables,
-            build_starts(task.tables, visited),
-            recipe.episodes,
-            task.protocol,
+        world = BatchedEpisodes(
+            spec.tables,
+            build_start_sampler(spec.tables, visited),
+            recipe.num_envs,
+            spec.protocol,
             recipe.max_steps,
             recipe.reward,
             seed,
@@ -103,34 +103,41 @@ class Worker:
             shape.inputs,
             self.explorations,
             shape.memory,
-            task.map_size,
+            spec.map_size,
             shape.map_width,
             resolved=False,
         )
-        self.loss = ActorCriticLoss(self.network, self.env.features, recipe)
-        self.collector = COLLECTORS[recipe.collector](self.env, self.policy, recipe.steps)
-        total = max(1, recipe.total // recipe.batch)
+        self.loss = recipe.build_loss(self.network, self.env.features)
+        self.collector = COLLECTORS[recipe.collector](self.env, self.policy, recipe.rollout_length)
+        total = max(1, recipe.total_steps // recipe.batch) * recipe.updates_per_batch
         falling = recipe.schedule == "linear"
         self.rate = lambda done: recipe.lr * (max(0.0, 1 - done / total) if falling else 1.0)
-        self.scores, self._refresh = Scores(recipe.episodes), recipe.refresh
+        self.scores, self._refresh = EpisodeStats(recipe.num_envs), recipe.memory_refresh_interval
 
     def update(self) -> dict[str, float]:
-        """Gather one batch and apply its gradient; gives figures by name."""
+        """Gather one batch and apply its gradients; gives the metrics of the last by name."""
         self._explore()
         batch = self.collector.collect()
         self.scores.take(batch)
+        for _ in range(self.recipe.updates_per_batch):
+            figures = self._learn(batch)
+        self.updates += 1
+        return figures
+
+    def _learn(self, batch: TensorDict) -> dict[str, float]:
         self.gradients.zero_()
         loss, figures = self.loss(batch)
         loss.backward()
         figures["gradient_norm"] = self._clip()
-        with self.turn():
+        with self.lock():
             recipe = self.recipe
             self.shared.apply(self.gradients, self.rate, recipe.alpha, recipe.eps)
             self._copy_weights()
-        self.updates += 1
         return figures
 
-    def round(self, updates: int, progress: Callable[[], None] = lambda: None) -> dict[str, float]:
+    def run_chunk(
+        self, updates: int, progress: Callable[[], None] = lambda: None
+    ) -> dict[str, float]:
         """So many updates; gives the means of their figures, and of the episodes that ended."""
         figures = []
         for _ in range(updates):
@@ -174,12 +181,12 @@ class Worker:
     def _clip(self) -> float:
         """Shorten the gradient to the recipe's length; gives its length before."""
         norm = float(self.gradients.norm())
-        if norm > self.recipe.clip:
-            self.gradients.mul_(self.recipe.clip / norm)
+        if norm > self.recipe.max_grad_norm:
+            self.gradients.mul_(self.recipe.max_grad_norm / norm)
         return norm
 
 
-class Scores:
+class EpisodeStats:
     """Return and success of the training episodes that ended since the last figures."""
 
     def __init__(self, n: int) -> None:

@@ -70,13 +70,12 @@ class Cycles(Renderer):
 
     def __init__(
         self,
-        cfg: RendererConfig,
+        cfg: CyclesConfig,
         plan: FloorPlan,
         part: str,
         look: int = 0,
         prepared: Prepared | None = None,
     ) -> None:
-        assert isinstance(cfg, CyclesConfig)
         self.check(cfg)
         self.cfg = cfg
         self._made_from = (plan, part, look)

@@ -46,13 +46,12 @@ class Raycast(Renderer):
 
     def __init__(
         self,
-        cfg: RendererConfig,
+        cfg: RaycastConfig,
         plan: FloorPlan,
         part: str,
         look: int = 0,
         prepared: Prepared | None = None,
     ) -> None:
-        assert isinstance(cfg, RaycastConfig)
         self.cfg = cfg
         self.scenery = scenery(plan, part, look)
         # the diagonal of a cell of the grid that light is baked on

@@ -22,17 +22,17 @@ from avn.mapping.ego_map import EgoMap, around, offsets
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.navigation.exploration import explore
 from avn.navigation.place import Place
-from avn.navigation.tables import Tables
+from avn.navigation.scene_batch import SceneBatch
 from avn.rl.networks import ActorCritic
 
 
-class Explorations:
+class ExplorationMemory:
     """Walks of R apartments, W each, in silence.
 
     Parameters
     ----------
     tables : Tables
-        With `feature`, and `window` for agents that map.
+        With `visual_embedding`, and `local_patch` for agents that map.
     walks : (R, W, T) int64 tensor
         States, as `tables` counts them.
     map_size, map_width : int, optional
@@ -47,7 +47,7 @@ class Explorations:
     """
 
     def __init__(
-        self, tables: Tables, walks: Tensor, map_size: int = 0, map_width: int = 0, top: int = 3
+        self, tables: SceneBatch, walks: Tensor, map_size: int = 0, map_width: int = 0, top: int = 3
     ) -> None:
         self.tables, self.walks = tables, walks
         self.h = self.c = torch.zeros(walks.shape[0] * walks.shape[1], 1, 0)
@@ -68,7 +68,7 @@ class Explorations:
         """Work through all walks with a network, and keep its memories."""
 
         def inputs(step: int) -> dict[str, Tensor]:
-            own = {"feature": self.tables.visual["feature"][self._flat[:, step]]}
+            own = {"visual_embedding": self.tables.visual["visual_embedding"][self._flat[:, step]]}
             if self.maps:
                 own["map"] = with_unknown_walk(self._seen[:, step].float())
             return own
@@ -94,7 +94,7 @@ class Explorations:
                 {
                     "odometry": odometry[:, step],
                     "collided": torch.zeros(len(self._flat), dtype=torch.bool),
-                    "window": self.tables.visual["window"][self._flat[:, step]],
+                    "local_patch": self.tables.visual["local_patch"][self._flat[:, step]],
                 },
                 batch_size=[len(self._flat)],
             )
@@ -103,7 +103,7 @@ class Explorations:
 
     def _find_places(self, top: int) -> Tensor:
         """Where each state is on the map of each walk, by what it looks like; (R * W, S', 3)."""
-        features, odometry = self.tables.visual["feature"], self._odometry()
+        features, odometry = self.tables.visual["visual_embedding"], self._odometry()
         bounds, each = self.tables.first_state.tolist(), self.walks.shape[1]
         longest = max(high - low for low, high in itertools.pairwise(bounds))
         poses = torch.zeros(len(self._flat), longest, 3, dtype=torch.int64)
@@ -142,7 +142,9 @@ def explored(
     return h, c
 
 
-def draw_walks(places: list[Place], tables: Tables, walks: int, steps: int, seed: int) -> Tensor:
+def draw_walks(
+    places: list[Place], tables: SceneBatch, walks: int, steps: int, seed: int
+) -> Tensor:
     """Exploration walks of each apartment, (R, walks, steps + 1) int64, as `tables` counts."""
     drawn = []
     for place, first in zip(places, tables.first_state.tolist(), strict=False):

@@ -13,66 +13,70 @@ import torch
 import torch.multiprocessing as mp
 
 from avn.core.errors import UserError
-from avn.core.progress import tell
+from avn.core.progress import log
 from avn.rl.shared import SharedState
-from avn.rl.worker import Task, Worker
+from avn.rl.worker import TrainingSpec, Worker
 
 Report = tuple[dict[str, float], dict[str, Any]]
 # Seconds after which the progress is looked at again.
 _LOOK = 0.2
 
 
-class Crew(Protocol):
+class WorkerPool(Protocol):
     """All workers of a training."""
 
-    def round(self, updates: int, progress: Callable[[], None]) -> list[Report]:
+    def run_chunk(self, updates: int, progress: Callable[[], None]) -> list[Report]:
         """Let every worker make so many updates; gives figures and states, worker by worker."""
 
     def close(self) -> None:
         """End the workers."""
 
 
-class LocalCrew:
+class LocalPool:
     """One worker, in this process and with one thread."""
 
-    def __init__(self, task: Task, shared: SharedState, states: list[dict[str, Any]]) -> None:
+    def __init__(
+        self, spec: TrainingSpec, shared: SharedState, states: list[dict[str, Any]]
+    ) -> None:
         self._threads = torch.get_num_threads()
         torch.set_num_threads(1)
-        self._worker = Worker(0, task, shared, nullcontext)
+        self._worker = Worker(0, spec, shared, nullcontext)
         if states:
             self._worker.load_state_dict(states[0])
 
-    def round(self, updates: int, progress: Callable[[], None]) -> list[Report]:
+    def run_chunk(self, updates: int, progress: Callable[[], None]) -> list[Report]:
         """Let the worker make so many updates."""
-        return [(self._worker.round(updates, progress), self._worker.state_dict())]
+        return [(self._worker.run_chunk(updates, progress), self._worker.state_dict())]
 
     def close(self) -> None:
         """Give the threads back."""
         torch.set_num_threads(self._threads)
 
 
-class SpawnedCrew:
+class SpawnedPool:
     """Workers in processes of their own, with one thread each.
 
     Raises
     ------
     UserError
-        Here and in `round`, where a worker dies; the others are ended.
+        Here and in `run_chunk`, where a worker dies; the others are ended.
     """
 
-    def __init__(self, task: Task, shared: SharedState, states: list[dict[str, Any]]) -> None:
-        context, count = mp.get_context("spawn"), task.recipe.workers
-        task.tables.share()
+    def __init__(
+        self, spec: TrainingSpec, shared: SharedState, states: list[dict[str, Any]]
+    ) -> None:
+        context, count = mp.get_context("spawn"), spec.recipe.workers
+        spec.tables.share()
         # kept, for a semaphore that nobody holds is gone before its process opens it
-        self._locks = locks = _locks(context, task.recipe.order, count)
+        self._locks = locks = _locks(context, spec.recipe.update_order, count)
         self._links: list[Connection] = []
         self._processes = []
         for rank in range(count):
             ours, theirs = context.Pipe()
-            turn = (locks[rank], locks[(rank + 1) % count])
+            lock = (locks[rank], locks[(rank + 1) % count])
             state = states[rank] if states else None
             process = context.Process(
-                target=_work, args=(rank, task, shared, turn, theirs, state), daemon=True
+                target=_work, args=(rank, spec, shared, lock, theirs, state), daemon=True
             )
             process.start()
             theirs.close()
@@ -81,7 +85,7 @@ class SpawnedCrew:
         for rank in range(count):  # all begin with the same weights, whoever is up first
             self._report(rank)
 
-    def round(self, updates: int, progress: Callable[[], None]) -> list[Report]:
+    def run_chunk(self, updates: int, progress: Callable[[], None]) -> list[Report]:
         """Let every worker make so many updates."""
         for link in self._links:
             with suppress(OSError):  # of a dead worker, which its report tells
@@ -109,8 +113,8 @@ class SpawnedCrew:
         if kind == "refused":
             raise UserError(found)
         raise UserError(
-            f"a3c.workers: worker {rank} died: {found}; the last checkpoint is whole, the same "
-            "command goes on from it"
+            f"algorithm.workers: worker {rank} died: {found}; the last checkpoint is whole, the "
+            "same command goes on from it"
         )
 
     def close(self) -> None:
@@ -129,7 +133,7 @@ def _locks(context: Any, order: str, count: int) -> list[Any]:
 
 
 @contextmanager
-def _turn(own: Any, following: Any) -> Iterator[None]:
+def _lock(own: Any, following: Any) -> Iterator[None]:
     own.acquire()
     yield
     following.release()
@@ -137,7 +141,7 @@ def _turn(own: Any, following: Any) -> Iterator[None]:
 
 def _work(
     rank: int,
-    task: Task,
+    spec: TrainingSpec,
     shared: SharedState,
     locks: tuple[Any, Any],
     link: Connection,
@@ -146,16 +150,16 @@ def _work(
     """What a process does: rounds, until it is ended."""
     torch.set_num_threads(1)
 
-    def turn() -> AbstractContextManager[None]:
-        return _turn(*locks)
+    def lock() -> AbstractContextManager[None]:
+        return _lock(*locks)
 
     try:
-        worker = Worker(rank, task, shared, turn)
+        worker = Worker(rank, spec, shared, lock)
         if state is not None:
             worker.load_state_dict(state)
         link.send(("done", None))
         while True:
-            figures = worker.round(link.recv())
+            figures = worker.run_chunk(link.recv())
             link.send(("done", (figures, worker.state_dict())))
     except (EOFError, KeyboardInterrupt):
         return
@@ -169,9 +173,12 @@ def _work(
         link.send(answer)
 
 
-def start_crew(task: Task, shared: SharedState, states: list[dict[str, Any]]) -> Crew:
+def start_pool(spec: TrainingSpec, shared: SharedState, states: list[dict[str, Any]]) -> WorkerPool:
     """Start the workers of a recipe, from their states where there are any."""
-    cores, workers = os.cpu_count() or 1, task.recipe.workers
+    cores, workers = os.cpu_count() or 1, spec.recipe.workers
     if workers > cores:
-        tell(f"a3c.workers: {workers} workers share {cores} cores and will wait for one another")
-    return (LocalCrew if workers == 1 else SpawnedCrew)(task, shared, states)
+        log(
+            f"algorithm.workers: {workers} workers share {cores} cores and will wait for one "
+            "another"
+        )
+    return (LocalPool if workers == 1 else SpawnedPool)(spec, shared, states)

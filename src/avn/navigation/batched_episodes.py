@@ -11,13 +11,23 @@ from avn.core.actions import BACKWARD
 from avn.core.clip_id import ClipId
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
-from avn.navigation.starts import Starts
-from avn.navigation.tables import Tables, advance
+from avn.navigation.scene_batch import SceneBatch, advance
+from avn.navigation.start_sampler import StartSampler
 
-_KEPT = ("state", "start", "source", "walk", "sound", "take", "actions", "attempted", "collided")
+_KEPT = (
+    "state",
+    "start",
+    "source",
+    "walk",
+    "sound",
+    "realisation",
+    "actions",
+    "attempted",
+    "collided",
+)
 
 
-class World:
+class BatchedEpisodes:
     """N episodes, each with its source, sound and start.
 
     Parameters
@@ -36,7 +46,7 @@ class World:
 
     Attributes
     ----------
-    state, start, source, sound, take : (N,) int64
+    state, start, source, sound, realisation : (N,) int64
         Where the agents are and began, and what they hear.
     walk : (N,) int64
         The exploration walk of each episode, counted through all apartments.
@@ -48,8 +58,8 @@ class World:
 
     def __init__(
         self,
-        tables: Tables,
-        starts: Starts,
+        tables: SceneBatch,
+        starts: StartSampler,
         n: int,
         protocol: Protocol,
         max_steps: int | None = None,
@@ -60,7 +70,7 @@ class World:
         self.max_steps, self.n = max_steps, n
         self.reward = reward or RewardConfig()
         self.generator = torch.Generator().manual_seed(seed)
-        self.state, self.start, self.source, self.walk, self.sound, self.take = (
+        self.state, self.start, self.source, self.walk, self.sound, self.realisation = (
             torch.zeros(n, dtype=torch.int64) for _ in range(6)
         )
         self.actions, self.attempted = (torch.zeros(n, dtype=torch.int64) for _ in range(2))
@@ -80,7 +90,7 @@ class World:
         self.actions = self.actions.masked_fill(rows, 0)
         self.attempted = self.attempted.masked_fill(rows, 0)
         self.collided = self.collided & ~rows
-        self._draw_takes(rows)
+        self._draw_realisations(rows)
 
     def step(self, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Move every agent by one action.
@@ -101,14 +111,14 @@ class World:
         self.actions = self.actions + 1
         self.attempted = self.attempted + (actions <= BACKWARD)
         success, terminated = self.protocol.judged(actions, arrived)
-        self._draw_takes()
+        self._draw_realisations()
         truncated = self._out_of_time() & ~terminated
         reward = torch.where(self.collided, self.reward.collision, self.reward.step)
         return torch.where(success, self.reward.success, reward), terminated, truncated
 
     def clip(self) -> Tensor:
         """The row of the clip that each agent hears now, (N,) int64."""
-        return self.tables.clip(ClipId(self.source, self.state, self.sound, self.take))
+        return self.tables.clip(ClipId(self.source, self.state, self.sound, self.realisation))
 
     def odometry(self) -> Tensor:
         """Cells to the right and to the front and quarter turns since the start, (N, 3) int64."""
@@ -125,11 +135,15 @@ class World:
             setattr(self, name, kept[name].clone())
         self.generator.set_state(kept["generator"])
 
-    def _draw_takes(self, rows: Tensor | None = None) -> None:
+    def _draw_realisations(self, rows: Tensor | None = None) -> None:
         """Let every agent, or those of some rows, hear another take."""
         if self.tables.realisations > 1:
-            takes = torch.randint(self.tables.realisations, (self.n,), generator=self.generator)
-            self.take = takes if rows is None else torch.where(rows, takes, self.take)
+            realisations = torch.randint(
+                self.tables.realisations, (self.n,), generator=self.generator
+            )
+            self.realisation = (
+                realisations if rows is None else torch.where(rows, realisations, self.realisation)
+            )
 
     def _out_of_time(self) -> Tensor:
         """Whose episodes are cut off after this action, (N,) bool."""

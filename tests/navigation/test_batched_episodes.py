@@ -3,20 +3,20 @@ import pytest
 import torch
 from small_worlds import make_walks, random_tables
 
+from avn.navigation.batched_episodes import BatchedEpisodes
 from avn.navigation.episodes import Episodes
 from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
-from avn.navigation.starts import build_starts
-from avn.navigation.world import World
+from avn.navigation.start_sampler import build_start_sampler
 
 PROTOCOLS = {
-    "var": Protocol("var", "box", False, "attempted", moves_factor=2.0),
-    "var_stop": Protocol("var_stop", "box", True, "attempted", moves_factor=2.0),
-    "stop": Protocol("stop", "radius", True, "walked"),
+    "var": Protocol("var", "box", False, "moves", max_moves_ratio=2.0),
+    "var_stop": Protocol("var_stop", "box", True, "moves", max_moves_ratio=2.0),
+    "stop": Protocol("stop", "radius", True, "metres"),
     # caps that episodes run into within the steps of the test
-    "short": Protocol("short", "box", False, "walked", max_actions=9),
-    "half": Protocol("half", "radius", False, "attempted", radius=0.5, moves_factor=1.3),
+    "short": Protocol("short", "box", False, "metres", max_actions=9),
+    "half": Protocol("half", "radius", False, "moves", radius=0.5, max_moves_ratio=1.3),
 }
 SECOND = "aaaa\naBaa\naaaA\naa.a"
 
@@ -26,7 +26,7 @@ def test_the_world_moves_and_ends_as_the_simulator_does(flat, name):
     protocol = PROTOCOLS[name]
     places = [draw("second", SECOND), flat]  # the second place's numbers are shifted
     tables = random_tables(places, protocol)
-    world = World(tables, build_starts(tables), 200, protocol, seed=3)
+    world = BatchedEpisodes(tables, build_start_sampler(tables), 200, protocol, seed=3)
     here = tables.source_room[world.source] == 1
     shift, first_source = int(tables.first_state[1]), int((tables.source_room == 0).sum())
     episodes = Episodes(
@@ -61,7 +61,7 @@ def test_the_world_moves_and_ends_as_the_simulator_does(flat, name):
 def test_rewards_are_ten_for_success_and_a_tenth_off_for_a_collision(rules):
     place = draw("row", "aaaaaA")
     tables = random_tables([place], rules)
-    world = World(tables, build_starts(tables), 3, rules, max_steps=50)
+    world = BatchedEpisodes(tables, build_start_sampler(tables), 3, rules, max_steps=50)
     east, north = 1, 0
     world.state = torch.tensor([4 * 2 + east, 4 * 3 + east, 4 * 3 + north])
     reward, terminated, truncated = world.step(torch.tensor([0, 0, 0]))
@@ -72,7 +72,7 @@ def test_rewards_are_ten_for_success_and_a_tenth_off_for_a_collision(rules):
 
 def test_a_training_episode_is_cut_off_after_its_steps_and_counts_as_truncated(flat, rules):
     tables = random_tables([flat], rules)
-    world = World(tables, build_starts(tables), 50, rules, max_steps=7)
+    world = BatchedEpisodes(tables, build_start_sampler(tables), 50, rules, max_steps=7)
     turn = torch.full((50,), 2)
     for step in range(7):
         _, terminated, truncated = world.step(turn)
@@ -82,7 +82,7 @@ def test_a_training_episode_is_cut_off_after_its_steps_and_counts_as_truncated(f
 
 def test_episodes_begin_everywhere_but_at_the_goal_and_equally_often(flat, rules):
     tables = random_tables([draw("second", SECOND), flat], rules)
-    starts = build_starts(tables)
+    starts = build_start_sampler(tables)
     source, _, state = starts.draw(60_000, torch.Generator().manual_seed(0))
     assert not tables.goal[tables.goal_row[source] + state].any()
     assert torch.equal(tables.room[state], tables.source_room[source])
@@ -98,7 +98,7 @@ def test_a_start_was_not_visited_by_the_walk_of_its_episode(flat, rules):
     visited = torch.zeros(1, 4, tables.states, dtype=torch.bool)
     for walk in range(4):
         visited[0, walk, walks[0, walk]] = True
-    starts = build_starts(tables, visited)
+    starts = build_start_sampler(tables, visited)
     source, walk, state = starts.draw(5000, torch.Generator().manual_seed(0))
     assert not visited[tables.source_room[source], walk, state].any()
 
@@ -106,7 +106,7 @@ def test_a_start_was_not_visited_by_the_walk_of_its_episode(flat, rules):
 def test_the_clip_that_is_heard_is_that_of_source_state_sound_and_take(flat, rules):
     places = [draw("second", SECOND), flat]
     tables = random_tables(places, rules)
-    world = World(tables, build_starts(tables), 64, rules, seed=2)
+    world = BatchedEpisodes(tables, build_start_sampler(tables), 64, rules, seed=2)
     generator = torch.Generator().manual_seed(0)
     hearing = []
     for place in places:  # the very numbers of `random_tables`
@@ -114,18 +114,20 @@ def test_the_clip_that_is_heard_is_that_of_source_state_sound_and_take(flat, rul
         hearing.append(torch.randn(sources, states, 2, 3, 6, generator=generator))
         torch.rand(states, 5, 5, generator=generator)
         torch.randn(states, 8, generator=generator)
-    heard = tables.audio["sound_feature"][world.clip()]
+    heard = tables.audio["audio_embedding"][world.clip()]
     for row in range(64):
         room = int(tables.room[world.state[row]])
         source = int(world.source[row]) - int((tables.source_room < room).sum())
         state = int(world.state[row] - tables.first_state[room])
-        expected = hearing[room][source, state, world.sound[row], world.take[row]]
+        expected = hearing[room][source, state, world.sound[row], world.realisation[row]]
         assert torch.equal(heard[row], expected)
 
 
 def test_a_world_goes_on_where_its_state_was_taken(flat, rules):
     tables = random_tables([flat], rules)
-    world, other = (World(tables, build_starts(tables), 8, rules, 9, seed=s) for s in (1, 2))
+    world, other = (
+        BatchedEpisodes(tables, build_start_sampler(tables), 8, rules, 9, seed=s) for s in (1, 2)
+    )
     actions = torch.randint(4, (30, 8), generator=torch.Generator().manual_seed(0))
 
     def go(which, some):

@@ -10,50 +10,52 @@ from numpy.typing import NDArray
 
 from avn.core.errors import UserError
 
-SOURCES = ("newest", "belief")
+FILTERS = ("latest", "bayes")
 
 
 @dataclass
-class HearingError:
-    """How far an estimate of the sound network is trusted, for `source=belief`.
+class SourceErrorModel:
+    """How far an estimate of the sound network is trusted, for `source_filter=bayes`.
 
     An estimate r metres away stands for a normal distribution with the standard deviation
-    `near` + `share` r; a part `behind` of the weight lies on its mirror image behind the agent,
-    for ears confuse front and back, and `outlier` lies anywhere.
+    `sigma` + `sigma_per_metre` r. A part `front_back_prob` of the weight lies on its mirror image
+    behind the agent, for ears confuse front and back, and `outlier_prob` lies anywhere.
 
     Attributes
     ----------
-    near : float
+    sigma : float
         Metres.
-    share, behind, outlier : float
+    sigma_per_metre, front_back_prob, outlier_prob : float
     weight : float
         What one estimate counts; less than 1, since the errors of one place repeat.
     """
 
-    near: float = 0.5
-    share: float = 0.25
-    behind: float = 0.1
-    outlier: float = 0.02
+    sigma: float = 0.5
+    sigma_per_metre: float = 0.25
+    front_back_prob: float = 0.1
+    outlier_prob: float = 0.02
     weight: float = 0.5
 
     def __post_init__(self) -> None:
-        for key in ("near", "share", "behind", "outlier", "weight"):
+        for key in ("sigma", "sigma_per_metre", "front_back_prob", "outlier_prob", "weight"):
             if not 0 <= getattr(self, key) <= 100:
                 raise UserError(f"planner.error.{key}: {getattr(self, key)}; give 0 to 100")
-        if self.near == 0 or self.outlier == 0 or self.behind >= 1:
-            raise UserError("planner.error: near and outlier are over 0, and behind is under 1")
+        if self.sigma == 0 or self.outlier_prob == 0 or self.front_back_prob >= 1:
+            raise UserError(
+                "planner.error: sigma and outlier_prob are over 0, and front_back_prob is under 1"
+            )
 
 
-class SourceSearch:
+class SourceBelief:
     """What N agents believe about the place of the source, on M x M squares each.
 
     Parameters
     ----------
     n, size : int
-    source : {"newest", "belief"}
+    source_filter : {"latest", "bayes"}
         The newest estimate alone, as in the paper, or the product of all of them.
     error : HearingError
-        For "belief".
+        For "bayes".
 
     Attributes
     ----------
@@ -63,13 +65,15 @@ class SourceSearch:
         Squares where the source is not.
     """
 
-    def __init__(self, n: int, size: int, source: str, error: HearingError) -> None:
-        if source not in SOURCES:
-            raise UserError(f"planner.source: '{source}' is none of {', '.join(SOURCES)}")
-        self.source, self.error = source, error
+    def __init__(self, n: int, size: int, source_filter: str, error: SourceErrorModel) -> None:
+        if source_filter not in FILTERS:
+            raise UserError(
+                f"planner.source_filter: '{source_filter}' is none of {', '.join(FILTERS)}"
+            )
+        self.source_filter, self.error = source_filter, error
         self.aim = np.full((n, 2), size // 2, dtype=np.float64)
         self.searched = np.zeros((n, size, size), dtype=np.bool_)
-        cells = size if source == "belief" else 0
+        cells = size if source_filter == "bayes" else 0
         self._log_belief = np.zeros((n, cells, cells), dtype=np.float32)
 
     def listen(
@@ -91,9 +95,9 @@ class SourceSearch:
             Who listens.
         """
         self.aim = np.where(running[:, None], aim, self.aim)
-        if self.source == "belief":
+        if self.source_filter == "bayes":
             e = self.error
-            own = (e.near, e.share, e.behind, e.outlier, e.weight)
+            own = (e.sigma, e.sigma_per_metre, e.front_back_prob, e.outlier_prob, e.weight)
             _weigh(self._log_belief, place, aim, mirrored, running, own)
 
     def rule_out(self, place: NDArray[np.int64], reach: int, rows: NDArray[np.bool_]) -> None:
@@ -110,7 +114,7 @@ class SourceSearch:
         Of the nodes that were not searched, the one nearest to the newest estimate, or the one
         believed most. Where all were searched, the search begins anew.
         """
-        if self.source == "belief":
+        if self.source_filter == "bayes":
             found, there = _likeliest(self._log_belief, cost, self.searched, running)
         else:
             found, there = _nearest(self.aim, cost, self.searched, running)
@@ -123,7 +127,7 @@ class SourceSearch:
 
 @numba.njit(cache=True, fastmath=True)
 def _weigh(log_belief, place, aim, mirrored, running, error):  # type: ignore[no-untyped-def]
-    near, share, behind, outlier, weight = error
+    sigma, sigma_per_metre, front_back_prob, outlier_prob, weight = error
     metres = 0.5
     size = log_belief.shape[1]
     for n in range(len(log_belief)):
@@ -131,17 +135,17 @@ def _weigh(log_belief, place, aim, mirrored, running, error):  # type: ignore[no
             continue
         ax, ay, bx, by = aim[n, 0], aim[n, 1], mirrored[n, 0], mirrored[n, 1]
         away = metres * np.sqrt((ax - place[n, 0]) ** 2 + (ay - place[n, 1]) ** 2)
-        spread = (near + share * away) / metres
+        spread = (sigma + sigma_per_metre * away) / metres
         inverse = np.float32(0.5 / spread**2)
         for y in range(size):
             for x in range(size):
                 d = np.float32((x - ax) ** 2 + (y - ay) ** 2) * inverse
                 e = np.float32((x - bx) ** 2 + (y - by) ** 2) * inverse
-                like = np.float32(outlier)
+                like = np.float32(outlier_prob)
                 if d < 20:
-                    like += np.float32(1 - behind) * np.exp(-d)
+                    like += np.float32(1 - front_back_prob) * np.exp(-d)
                 if e < 20:
-                    like += np.float32(behind) * np.exp(-e)
+                    like += np.float32(front_back_prob) * np.exp(-e)
                 log_belief[n, y, x] += np.float32(weight) * np.log(like)
 
 

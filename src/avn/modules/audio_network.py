@@ -1,4 +1,4 @@
-"""What listening networks share: clips become pictures, pictures and their mirrors an answer."""
+"""Base class of networks on clips: spectrograms, and the mean over a clip and its mirror image."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any, ClassVar, TypedDict
 import torch
 from torch import Tensor
 
-from avn.modules.network import Network, build_part
+from avn.core.classes import build_part
+from avn.modules.network import Network, OptimizerConfig, Part, as_part
 from avn.modules.spectrogram import Spectrogram
 
 
@@ -33,11 +34,42 @@ class PictureBatch(TypedDict):
     sound: Tensor
 
 
-class Listener(Network):
-    """Spectrogram and network, and the symmetry of left and right.
+SPECTROGRAM: Part = {"_target_": "avn.modules.spectrogram.Spectrogram"}
+FIVE_LAYERS: Part = {"_target_": "avn.modules.five_layer_cnn.FiveLayerCnn"}
 
-    A subclass calls `build_ears` after `save_hyperparameters`. Its recipe has `spectrogram`, `net`,
-    `mirror` and `symmetric`, which `avn.modules.sound_cnn.SoundCnn` describes.
+
+class AudioNetwork(Network):
+    """Network on spectrograms of two ears, with the symmetry of left and right.
+
+    Parameters
+    ----------
+    name : str
+        The option of the config group.
+    spectrogram : dict
+        Config of the spectrogram, with `_target_`.
+    net : dict
+        Config of the network behind it, with `_target_`.
+    optimizer : dict
+        Config of the optimiser, with `_target_`.
+    schedule : {"cosine", "constant"}
+        Learning rate over the epochs; "cosine" warms up over the first tenth and falls to 0.
+    epochs : int
+        Length of the training.
+    patience : int
+        Epochs without progress after which training stops early.
+    batch : int
+        Clips in a batch; read by the data module.
+    flip_augmentation : bool
+        Shows half of the training clips with ears and locations mirrored, which is exact: the
+        head is symmetric and so is the world.
+    flip_tta : bool
+        Estimates as the mean over a clip and its mirror image, mirrored back.
+    train_seed : int
+        Draws the weights and all that is random in training.
+    sounds_per_pair : int
+        Sounds in which each pair of source and state is heard in an epoch; read by the data module.
+    validation_clips : int
+        Most clips of each set of apartments on which it is measured; read by the data module.
 
     Attributes
     ----------
@@ -48,12 +80,28 @@ class Listener(Network):
     unit = "clips"
     mirror_signs: ClassVar[tuple[float, ...]]
 
-    def build_ears(self) -> None:
-        """Build spectrogram and network from the recipe."""
+    def __init__(
+        self,
+        name: str,
+        spectrogram: Part = SPECTROGRAM,
+        net: Part = FIVE_LAYERS,
+        optimizer: OptimizerConfig | Part | None = None,
+        schedule: str = "cosine",
+        epochs: int = 15,
+        patience: int = 6,
+        batch: int = 64,
+        flip_augmentation: bool = True,
+        flip_tta: bool = True,
+        train_seed: int = 0,
+        sounds_per_pair: int = 1,
+        validation_clips: int = 2000,
+    ) -> None:
+        super().__init__()
+        optimizer = as_part(optimizer or OptimizerConfig())
+        self.save_hyperparameters(ignore=["criterion", "threshold"])
         self.check_recipe()
-        self.mirror: bool = self.hparams["mirror"]
-        self.symmetric: bool = self.hparams["symmetric"]
-        self.spectrogram: Spectrogram = build_part(self.hparams["spectrogram"], self.node)
+        self.flip_augmentation, self.flip_tta = flip_augmentation, flip_tta
+        self.spectrogram: Spectrogram = build_part(spectrogram, self.node)
         channels, *size = (
             self.spectrogram.channels,
             self.spectrogram.bands,
@@ -69,15 +117,15 @@ class Listener(Network):
 
     def estimate(self, pictures: Tensor) -> Tensor:
         """(N, channels, bands, frames) pictures to (N, outputs)."""
-        if not self.symmetric or self.training:
+        if not self.flip_tta or self.training:
             return self._net(pictures)
         both = torch.cat((pictures, self.spectrogram.mirror(pictures)))
         straight, mirrored = self._net(both).chunk(2)
         return (straight + mirrored * mirrored.new_tensor(self.mirror_signs)) / 2
 
-    def half_mirrored(self, pictures: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+    def random_flip(self, pictures: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
         """Mirror a random half of pictures and targets (N, outputs), where the recipe says so."""
-        if not self.mirror:
+        if not self.flip_augmentation:
             return pictures, target
         chosen = torch.rand(len(target)).lt(0.5).to(target.device)
         mirrored = self.spectrogram.mirror(pictures)

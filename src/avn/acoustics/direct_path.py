@@ -2,8 +2,8 @@
 
 Two regimes decide what a wall does to it:
 
-- ``through_walls``: it comes straight from the source, whatever stands between, at 1/r.
-- ``round_corners``: where a wall stands between, it takes the shortest way round the corners and
+- ``transmission``: it comes straight from the source, whatever stands between, at 1/r.
+- ``diffraction``: where a wall stands between, it takes the shortest way round the corners and
   comes from the last of them, weakened in each band by the screen formula of Maekawa (Applied
   Acoustics 1, 1968) as fitted by 10 log10(3 + 20 N) dB, N = 2 x detour / wavelength, with the
   detour of the whole way. Furniture lets it pass in both regimes.
@@ -20,17 +20,17 @@ from scipy import fft
 
 from avn.acoustics.ambisonics import sh
 from avn.acoustics.band_filters import minimum_phase
-from avn.acoustics.corners import Paths, paths_round_corners, straight_paths
+from avn.acoustics.corners import Paths, diffracted_paths, straight_paths
 from avn.acoustics.materials import BANDS, SPEED_OF_SOUND
 from avn.acoustics.rendering import to_int16
 from avn.core.errors import UserError
 
 LOSS_TAPS = 128
-REGIMES = ("through_walls", "round_corners")
+REGIMES = ("transmission", "diffraction")
 
 
 @dataclass(frozen=True)
-class FirstArrivals:
+class DirectPaths:
     """What each of L listeners hears first, at the ears of the four headings.
 
     Attributes
@@ -55,11 +55,11 @@ def find_paths(
     listeners: NDArray[np.float64],
 ) -> Paths:
     """The ways of the first arrivals in a regime; raises `UserError` for an unknown one."""
-    if regime == "through_walls":
+    if regime == "transmission":
         return straight_paths(source, listeners)
-    if regime == "round_corners":
-        return paths_round_corners(walls, source, listeners)
-    raise UserError(f"acoustics.first_arrival: '{regime}' is not known; use {' or '.join(REGIMES)}")
+    if regime == "diffraction":
+        return diffracted_paths(walls, source, listeners)
+    raise UserError(f"acoustics.direct_path: '{regime}' is not known; use {' or '.join(REGIMES)}")
 
 
 def screen_loss(detour: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -79,7 +79,7 @@ def band_energies(paths: Paths) -> NDArray[np.float64]:
 
 def render_paths(
     paths: Paths, filters: NDArray[np.float32], rate: int, loss_taps: int = LOSS_TAPS
-) -> FirstArrivals:
+) -> DirectPaths:
     """Render ways to the ears.
 
     Parameters
@@ -112,4 +112,4 @@ def render_paths(
     samples, scale = to_int16(ears)
     ways = np.where(reached, paths.length, 0.0)
     onset = np.rint(ways * (rate / SPEED_OF_SOUND)).astype(np.int32)
-    return FirstArrivals(samples, scale, onset)
+    return DirectPaths(samples, scale, onset)

@@ -23,7 +23,7 @@ _FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 
 @dataclass(frozen=True)
-class Tables:
+class SceneBatch:
     """R apartments with S states in all and Q sources in all; a state counts through all of them.
 
     Everything is a tensor or a plain value, so that it travels to other processes; `share` puts it
@@ -112,7 +112,7 @@ class Tables:
         frame, begin = origin or self.origin(start)
         return self.places[frame + state] - begin
 
-    def share(self) -> Tables:
+    def share(self) -> SceneBatch:
         """Move all tensors to shared memory; returns itself."""
         for value in vars(self).values():
             for tensor in value.values() if isinstance(value, dict) else [value]:
@@ -122,7 +122,7 @@ class Tables:
 
 
 def advance(
-    tables: Tables, goal_row: Tensor, state: Tensor, action: Tensor
+    tables: SceneBatch, goal_row: Tensor, state: Tensor, action: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Move N agents by one action: the one rule of motion, for evaluation and for training.
 
@@ -148,12 +148,12 @@ def advance(
     return following, blocked, tables.goal[goal_row + following]
 
 
-def build_tables(
+def build_scene_batch(
     places: Sequence[Place],
     protocol: Protocol,
     observations: Sequence[SceneObservations] = (),
     sounds: int = 1,
-) -> Tables:
+) -> SceneBatch:
     """Lay out apartments.
 
     Parameters
@@ -178,7 +178,7 @@ def build_tables(
     # the rows of all sources of an apartment, then those of the next
     own_states = torch.from_numpy(np.diff(states))[source_room]
     row = torch.cumsum(own_states, 0) - own_states - offsets[source_room]
-    return Tables(
+    return SceneBatch(
         following=_laid_out([transitions(p.grid.neighbours) for p in places], offsets),
         room=torch.from_numpy(np.repeat(np.arange(len(places)), np.diff(states))),
         first_state=torch.from_numpy(states),

@@ -8,11 +8,11 @@ import torch
 from torch import Tensor
 
 from avn.core.errors import UserError
-from avn.navigation.tables import Tables
+from avn.navigation.scene_batch import SceneBatch
 
 
 @dataclass(frozen=True)
-class Starts:
+class StartSampler:
     """For each source and walk, the states in which an episode may begin.
 
     Attributes
@@ -42,7 +42,7 @@ class Starts:
         return source, walk, self.states[self.first[which] + place]
 
 
-def build_starts(tables: Tables, visited: Tensor | None = None) -> Starts:
+def build_start_sampler(tables: SceneBatch, visited: Tensor | None = None) -> StartSampler:
     """The lists of an apartment's tables.
 
     Parameters
@@ -69,4 +69,4 @@ def build_starts(tables: Tables, visited: Tensor | None = None) -> Starts:
             fresh = away if visited is None else away & ~visited[room, walk, low:high]
             lists.append(states[fresh if bool(fresh.any()) else away])
     count = torch.tensor([len(own) for own in lists])
-    return Starts(walks, torch.cat(lists), torch.cumsum(count, 0) - count, count)
+    return StartSampler(walks, torch.cat(lists), torch.cumsum(count, 0) - count, count)

@@ -4,9 +4,9 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from avn.acoustics.ambisonics import sh
-from avn.acoustics.brir import AcousticsConfig, combine, render_first_arrivals, render_source
-from avn.acoustics.corners import paths_round_corners, sees
-from avn.acoustics.first_arrival import FirstArrivals, band_energies, find_paths, screen_loss
+from avn.acoustics.brir import AcousticsConfig, combine, render_direct_paths, render_source
+from avn.acoustics.corners import diffracted_paths, sees
+from avn.acoustics.direct_path import DirectPaths, band_energies, find_paths, screen_loss
 from avn.acoustics.hrtf import load_sh_hrirs
 from avn.acoustics.materials import SPEED_OF_SOUND
 from avn.apartments.floor_plan import Doorway, FloorPlan, Room
@@ -16,7 +16,7 @@ from avn.apartments.walls import walls
 from avn.core.errors import UserError
 
 RESONANCE = AcousticsConfig()
-DIFFRACTION = AcousticsConfig(name="diffraction", first_arrival="round_corners")
+DIFFRACTION = AcousticsConfig(name="diffraction", direct_path="diffraction")
 NO_WALLS = np.zeros((0, 4))
 EAR = np.array([[0.0, 0.0, 1.5]])
 FINE = 1_536_000  # Hz: cross-correlations are interpolated to this
@@ -28,7 +28,7 @@ def around(degrees: float, distance: float = 2.0) -> NDArray[np.float64]:
     return np.array([distance * np.sin(angle), distance * np.cos(angle), 1.5])
 
 
-def responses(first: FirstArrivals) -> NDArray[np.float64]:
+def responses(first: DirectPaths) -> NDArray[np.float64]:
     return first.samples * first.scale[:, None, None, None].astype(np.float64)
 
 
@@ -57,7 +57,7 @@ def test_time_and_level_differences_are_those_of_the_hrirs(
     side: int, degrees: int, heading: int
 ) -> None:
     source = around(90 * heading + side * degrees)
-    first = render_first_arrivals(NO_WALLS, source, EAR, RESONANCE)
+    first = render_direct_paths(NO_WALLS, source, EAR, RESONANCE)
     time, level = cues(responses(first)[0, heading], RESONANCE.rate)
     # The set itself, at its own rate: the left ear, and as the right ear its mirror image.
     hrirs = load_sh_hrirs()
@@ -76,7 +76,7 @@ def test_time_and_level_differences_are_those_of_the_hrirs(
 
 def test_the_level_falls_as_one_over_distance() -> None:
     for distance in (0.5, 2.0, 7.0):
-        first = render_first_arrivals(NO_WALLS, around(0, distance), EAR, RESONANCE)
+        first = render_direct_paths(NO_WALLS, around(0, distance), EAR, RESONANCE)
         energy = (responses(first)[0, 0] ** 2).sum(axis=-1).mean()
         assert energy == pytest.approx(1 / (4 * np.pi * distance**2), rel=1e-3)
         assert first.onset[0] == round(distance / SPEED_OF_SOUND * 16000)
@@ -85,7 +85,7 @@ def test_the_level_falls_as_one_over_distance() -> None:
 def test_the_spectrum_does_not_betray_the_time_of_flight() -> None:
     """Arrivals start on whole samples: but for its level, the taps are the same at any distance."""
     near, far = (
-        render_first_arrivals(NO_WALLS, around(40, distance), EAR, RESONANCE)
+        render_direct_paths(NO_WALLS, around(40, distance), EAR, RESONANCE)
         for distance in (1.0, 6.1234)
     )
     assert near.onset[0] != far.onset[0]
@@ -107,7 +107,7 @@ def bearing(vector: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_round_corners_the_first_arrival_comes_from_the_doorway() -> None:
     source = np.array([1.0, 4.0, 1.0])
     listeners = np.array([[4.5, 3.0, 1.5], [5.5, 4.0, 1.5], [3.5, 2.5, 1.5]])
-    paths = find_paths("round_corners", walls(three_rooms()), source, listeners)
+    paths = find_paths("diffraction", walls(three_rooms()), source, listeners)
     assert paths.bent.all()
     doorway = np.array([3.0, 1.0])
     off = bearing(paths.arrival[:, :2]) - bearing(doorway - listeners[:, :2])
@@ -115,7 +115,7 @@ def test_round_corners_the_first_arrival_comes_from_the_doorway() -> None:
     # Within the half width of the doorway, as it is seen from there.
     assert (np.abs(off) < np.rad2deg(np.arctan2(0.46, reach))).all()
     # The straight line would come from elsewhere.
-    straight = find_paths("through_walls", walls(three_rooms()), source, listeners)
+    straight = find_paths("transmission", walls(three_rooms()), source, listeners)
     away = np.abs(bearing(straight.arrival[:, :2]) - bearing(doorway - listeners[:, :2]))
     assert (away > 20).all()
 
@@ -124,7 +124,7 @@ def test_ears_hear_the_doorway_and_not_the_wall() -> None:
     """Facing west in the middle room, the doorway is on the left and the source on the right."""
     source, listener = np.array([1.0, 4.5, 1.0]), np.array([[4.0, 3.0, 1.5]])
     for config, louder in ((DIFFRACTION, 0), (RESONANCE, 1)):
-        first = render_first_arrivals(walls(three_rooms()), source, listener, config)
+        first = render_direct_paths(walls(three_rooms()), source, listener, config)
         energy = (responses(first)[0, 3] ** 2).sum(axis=-1)
         assert energy.argmax() == louder
         assert abs(10 * np.log10(energy[0] / energy[1])) > 3
@@ -133,7 +133,7 @@ def test_ears_hear_the_doorway_and_not_the_wall() -> None:
 def test_the_way_round_one_screen_is_the_length_of_its_legs() -> None:
     screen = np.array([[-10.0, -0.05, 1.0, 0.05]])
     source, listener = np.array([-1.0, -2.0, 1.0]), np.array([[-1.0, 2.0, 1.5]])
-    paths = paths_round_corners(screen, source, listener)
+    paths = diffracted_paths(screen, source, listener)
     plan = 2 * np.hypot(2.0, 1.95) + 0.1
     assert paths.length[0] == pytest.approx(np.hypot(plan, 0.5), abs=0.01)
     assert paths.detour[0] == pytest.approx(paths.length[0] - np.sqrt(16.25), abs=1e-9)
@@ -156,10 +156,10 @@ def test_the_screen_weakens_high_bands_more() -> None:
 def test_rendered_bands_have_the_energy_of_the_formula() -> None:
     source, listener = np.array([1.0, 4.0, 1.0]), np.array([[5.5, 4.0, 1.5]])
     plan_walls = walls(three_rooms())
-    first = render_first_arrivals(plan_walls, source, listener, DIFFRACTION)
-    paths = find_paths("round_corners", plan_walls, source, listener)
+    first = render_direct_paths(plan_walls, source, listener, DIFFRACTION)
+    paths = find_paths("diffraction", plan_walls, source, listener)
     wanted = band_energies(paths)[0]
-    free = render_first_arrivals(NO_WALLS, listener[0] + 2 * paths.arrival[0], listener, RESONANCE)
+    free = render_direct_paths(NO_WALLS, listener[0] + 2 * paths.arrival[0], listener, RESONANCE)
     # Against the same direction in the open only the loss is left.
     spectra = [np.abs(np.fft.rfft(responses(f)[0, 3, 0], 16000)) for f in (first, free)]
     loss = (spectra[0] / spectra[1])[[250, 500, 1000, 2000, 4000]] ** 2 / (4 * np.pi * 4)
@@ -169,8 +169,8 @@ def test_rendered_bands_have_the_energy_of_the_formula() -> None:
 def test_walls_in_sight_change_nothing() -> None:
     plan_walls = walls(three_rooms())
     source, listeners = np.array([1.0, 1.0, 1.0]), np.array([[2.0, 4.0, 1.5], [5.0, 1.0, 1.5]])
-    one = find_paths("round_corners", plan_walls, source, listeners)
-    other = find_paths("through_walls", plan_walls, source, listeners)
+    one = find_paths("diffraction", plan_walls, source, listeners)
+    other = find_paths("transmission", plan_walls, source, listeners)
     assert not one.bent.any()
     assert np.array_equal(one.length, other.length)
     assert np.array_equal(one.arrival, other.arrival)
@@ -186,7 +186,7 @@ def test_lines_that_graze_a_wall_see_and_lines_through_it_do_not() -> None:
 def test_a_closed_room_lets_no_first_arrival_in() -> None:
     box = np.array([[2, 2, 4, 2.1], [2, 3.9, 4, 4], [2, 2, 2.1, 4], [3.9, 2, 4, 4]], dtype=float)
     listeners = np.array([[3.0, 3.0, 1.5], [1.0, 5.0, 1.5]])
-    first = render_first_arrivals(box, np.array([0.0, 0.0, 1.0]), listeners, DIFFRACTION)
+    first = render_direct_paths(box, np.array([0.0, 0.0, 1.0]), listeners, DIFFRACTION)
     assert first.scale[0] == 0
     assert not first.samples[0].any()
     assert first.scale[1] > 0
@@ -199,11 +199,9 @@ def test_level_falls_with_the_way_to_walk() -> None:
     source_cell = int(np.flatnonzero((grid.lattice == [2, 8]).all(axis=1))[0])
     ears = np.column_stack([grid.centres, np.full(len(grid.centres), 1.5)])
     source = np.array([1.0, 4.0, 1.0])
-    config = AcousticsConfig(
-        name="diffraction", first_arrival="round_corners", rays=3000, seconds=0.3
-    )
+    config = AcousticsConfig(name="diffraction", direct_path="diffraction", rays=3000, seconds=0.3)
     tail = render_source(build_surfaces(plan), source, ears, config)
-    whole = combine(tail, render_first_arrivals(walls(plan), source, ears, config))
+    whole = combine(tail, render_direct_paths(walls(plan), source, ears, config))
     level = 10 * np.log10((whole**2).sum(axis=(1, 2, 3)))
     way = grid.distances[source_cell]
     assert spearmanr(level, way).statistic < -0.9
@@ -214,5 +212,5 @@ def test_level_falls_with_the_way_to_walk() -> None:
 
 
 def test_an_unknown_regime_is_named() -> None:
-    with pytest.raises(UserError, match=r"acoustics.first_arrival: 'teleport'.*round_corners"):
+    with pytest.raises(UserError, match=r"acoustics.direct_path: 'teleport'.*diffraction"):
         find_paths("teleport", NO_WALLS, EAR[0], EAR)

@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 
 from avn.core.errors import UserError
-from avn.planning.source_search import HearingError, SourceSearch
+from avn.planning.source_belief import SourceBelief, SourceErrorModel
 
 YES = np.array([True])
 
 
-def search(source: str = "newest") -> SourceSearch:
-    return SourceSearch(1, 21, source, HearingError())
+def search(source: str = "latest") -> SourceBelief:
+    return SourceBelief(1, 21, source, SourceErrorModel())
 
 
-def listen(own: SourceSearch, place: tuple[int, int], aim: tuple[float, float]) -> None:
+def listen(own: SourceBelief, place: tuple[int, int], aim: tuple[float, float]) -> None:
     mirrored = (aim[0], 2 * place[1] - aim[1])
     own.listen(np.array([place]), np.array([aim]), np.array([mirrored]), YES)
 
@@ -42,7 +42,7 @@ def test_where_it_searched_it_does_not_search_again_until_all_is_searched() -> N
 
 def test_belief_finds_where_bearings_cross() -> None:
     # From two places the source is heard in the right direction at the wrong distance.
-    own, cost = search("belief"), np.ones((1, 21, 21), dtype=np.float32)
+    own, cost = search("bayes"), np.ones((1, 21, 21), dtype=np.float32)
     listen(own, (2, 2), (8.0, 8.0))
     listen(own, (18, 2), (12.0, 8.0))
     x, y = own.targets(cost, YES)[0]
@@ -51,7 +51,7 @@ def test_belief_finds_where_bearings_cross() -> None:
 
 
 def test_belief_forgets_a_confusion_of_front_and_back() -> None:
-    own, cost = search("belief"), np.ones((1, 21, 21), dtype=np.float32)
+    own, cost = search("bayes"), np.ones((1, 21, 21), dtype=np.float32)
     listen(own, (10, 10), (10.0, 4.0))  # the source is in front, and was heard behind
     assert own.targets(cost, YES)[0, 1] < 10
     listen(own, (10, 11), (10.0, 16.0))
@@ -60,7 +60,9 @@ def test_belief_forgets_a_confusion_of_front_and_back() -> None:
 
 
 def test_settings_that_cannot_work_are_refused() -> None:
-    with pytest.raises(UserError, match=r"planner.source: 'oldest' is none of newest, belief"):
+    with pytest.raises(
+        UserError, match=r"planner.source_filter: 'oldest' is none of latest, bayes"
+    ):
         search("oldest")
-    with pytest.raises(UserError, match=r"planner.error.share: -1"):
-        HearingError(share=-1)
+    with pytest.raises(UserError, match=r"planner.error.sigma_per_metre: -1"):
+        SourceErrorModel(sigma_per_metre=-1)

@@ -1,4 +1,7 @@
-"""Config folders of the user's, `--config-dir MINE`, whose classes bring their own schemas."""
+"""Config files whose options are typed by the classes they name: ours and those of the user.
+
+A user's folders are named on the command line, `--config-dir FOLDER`.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,12 @@ from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.object_type import ObjectType
 from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf, open_dict
 
-from avn.config.signatures import is_foreign, with_signature
+from avn.config.folder import conf_folder
+from avn.config.renamed import check_file
+from avn.config.schema import SCHEMAS
+from avn.config.signatures import is_option, with_signature
 from avn.core.errors import UserError
 
 _OPTIONS = ("--config-dir", "-cd")
@@ -41,8 +47,8 @@ def take_folders(arguments: list[str]) -> list[str]:
     return rest
 
 
-class UserConfigs(ConfigSource):
-    """A folder of config files in which a class from outside the package has its own schema."""
+class OptionFiles(ConfigSource):
+    """A folder of config files in which an option has the schema of its class."""
 
     def __init__(self, provider: str, path: str) -> None:
         super().__init__(provider, path)
@@ -54,14 +60,17 @@ class UserConfigs(ConfigSource):
 
     def load_config(self, config_path: str) -> ConfigResult:
         found = self._files.load_config(config_path)
-        node, group = found.config, config_path.split("/")[0]
-        if isinstance(node, DictConfig):
-            if found.header.get("package") == "_global_":
-                for own in map(str, list(node)):
-                    if is_foreign(own, node[own]):
-                        node[own] = with_signature(own, node[own])
-            elif is_foreign(group, node):
-                found.config = with_signature(group, node)
+        node = found.config
+        if not isinstance(node, DictConfig):
+            return found
+        is_global = found.header.get("package") == "_global_"
+        check_file(config_path, node, is_global)
+        if is_global:
+            for own in map(str, list(node)):
+                if is_option(own, node[own]):
+                    node[own] = with_signature(own, node[own])
+        else:
+            found.config = _typed(config_path, node)
         return found
 
     def is_group(self, config_path: str) -> bool:
@@ -77,12 +86,35 @@ class UserConfigs(ConfigSource):
         return self._files.list(config_path, results_filter)
 
 
-class UserConfigsPath(SearchPathPlugin):
-    """Adds the user's folders to the places where Hydra looks, before ours."""
+class OptionFilesPath(SearchPathPlugin):
+    """Lets `OptionFiles` read the user's folders, which come first, and ours."""
 
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
+        ours = conf_folder().resolve()
+        for element in search_path.get_path():
+            path = (element.path or "").removeprefix("file://")
+            if "://" not in path and Path(path).resolve() == ours:
+                element.path = f"avn://{ours}"
         for folder in _folders:
             search_path.prepend("command-line", f"avn://{folder}")
 
 
-PLUGINS = (UserConfigs, UserConfigsPath)
+def _typed(name: str, node: DictConfig) -> DictConfig:
+    """An option with its schema; one that stands on another of its group gets it from that."""
+    defaults = node.pop("defaults", None)
+    if "/" in name and any(str(own).endswith("schema") for own in defaults or ()):
+        raise UserError(
+            f"{name}: its defaults name a schema, which options need no more; remove it"
+        )
+    group = name.split("/")[0]
+    if is_option(group, node):
+        node = with_signature(group, node)
+    elif group in SCHEMAS and defaults is None:
+        node = OmegaConf.merge(OmegaConf.structured(SCHEMAS[group]), node)  # type: ignore
+    if defaults is not None:
+        with open_dict(node):
+            node["defaults"] = defaults
+    return node
+
+
+PLUGINS = (OptionFiles, OptionFilesPath)

@@ -1,0 +1,18 @@
+"""What Hydra is told of before it composes a config: schemas, and where options come from."""
+
+from __future__ import annotations
+
+from hydra.core.config_store import ConfigStore
+from hydra.core.plugins import Plugins
+
+from avn.config import audio_source, option_files
+from avn.config.schema import COMMANDS
+
+
+def register() -> None:
+    """Register schemas and plugins; may be called again."""
+    store = ConfigStore.instance()
+    for command, schema in COMMANDS.items():
+        store.store(name=f"{command}_schema", node=schema)
+    for plugin in (*audio_source.PLUGINS, *option_files.PLUGINS):
+        Plugins.instance().register(plugin)

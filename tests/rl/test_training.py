@@ -1,0 +1,212 @@
+import os
+import signal
+import time
+
+import pytest
+import torch
+from small_worlds import make_spec, make_walks, make_worker, random_tables
+from torch.nn import functional as F
+
+from avn.core.errors import UserError
+from avn.rl import worker_pool
+from avn.rl.networks import ActorCritic, sample
+from avn.rl.shared import SharedState
+from avn.rl.training import BEST, LAST, Training, load_network, read_checkpoint
+
+
+def measure(network):
+    """A figure that no two networks share."""
+    return {"validation/spl": float(network.actor.weight.detach().sum())}
+
+
+def training(spec, folder, made_from="a" * 64) -> Training:
+    torch.manual_seed(1)
+    network = ActorCritic(spec.shape)
+    network.load_state_dict(spec.buffers, strict=False)
+    return Training(spec, network, folder, measure, made_from)
+
+
+def test_shared_rmsprop_is_that_of_torch():
+    generator = torch.Generator().manual_seed(0)
+    weights = torch.randn(50, generator=generator)
+    reference = torch.nn.Parameter(weights.clone())
+    optimiser = torch.optim.RMSprop([reference], lr=0.01, alpha=0.9, eps=0.1)
+    shared = SharedState.of(weights)
+    for _ in range(20):
+        gradient = torch.randn(50, generator=generator)
+        reference.grad = gradient.clone()
+        optimiser.step()
+        shared.apply(gradient, lambda done: 0.01, 0.9, 0.1)
+    assert torch.allclose(shared.weights, reference.detach(), atol=1e-6)
+
+
+@pytest.mark.parametrize("memory", [0, 5])
+def test_one_worker_is_synchronous_a2c_step_for_step(flat, rules, memory):
+    """Against a plain loop: its own returns, losses, clipping and torch's RMSProp."""
+    tables = random_tables([flat], rules)
+    spec = make_spec(
+        tables, rules, memory=memory, max_grad_norm=0.5, lr=0.01, eps=1e-3, schedule="constant"
+    )
+    worker, twin = make_worker(spec), make_worker(spec)
+    network, env, draws = twin.network, twin.env, twin.policy.generator
+    parameters = [torch.nn.Parameter(p.detach().clone()) for p in network.parameters()]
+    optimiser = torch.optim.RMSprop(parameters, lr=0.01, alpha=0.99, eps=1e-3)
+    for _ in range(8):
+        worker.update()
+        seen, logs, values, entropies, rewards, ends = env.observation(), [], [], [], [], []
+        h, c = env.observation().get("h"), env.observation().get("c")
+        if not memory:
+            h, c = network.no_memory(6)
+        for _ in range(5):
+            features = env.features(seen["state"], seen["clip"])
+            joint, h_next, c_next = network.remember(network.embed(features), h, c)
+            logits = network.actor(joint)
+            action = sample(logits.detach(), draws)
+            log_p = F.log_softmax(logits, dim=1)
+            logs.append(log_p.gather(1, action[:, None])[:, 0])
+            entropies.append(-(log_p.exp() * log_p).sum(dim=1))
+            values.append(network.critic(joint)[:, 0])
+            kept = (h_next.detach(), c_next.detach()) if memory else ()
+            reward, terminated, truncated = env.move(action, *kept)
+            rewards.append(reward)
+            with torch.no_grad():
+                after = env.observation()
+                embedding = network.embed(env.features(after["state"], after["clip"]))
+                last, *_ = network.remember(embedding, h_next, c_next)
+                ends.append((terminated, truncated, network.critic(last)[:, 0]))
+            done = terminated | truncated
+            fresh = done[:, None, None]
+            if done.any():
+                env.begin(done)
+            seen = env.observation()
+            h, c = torch.where(fresh, 0.0, h_next), torch.where(fresh, 0.0, c_next)
+        ahead, targets = ends[-1][2], []
+        for reward, (terminated, truncated, value) in zip(rewards[::-1], ends[::-1], strict=True):
+            ahead = torch.where(truncated, value, ahead) * ~terminated
+            ahead = reward + 0.99 * ahead
+            targets.insert(0, ahead)
+        target, value = torch.stack(targets), torch.stack(values)
+        loss = -(torch.stack(logs) * (target - value).detach()).mean()
+        loss = loss - 0.01 * torch.stack(entropies).mean() + 0.5 * ((value - target) ** 2).mean()
+        twin.gradients.zero_()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 0.5)
+        for parameter, own in zip(parameters, network.parameters(), strict=True):
+            parameter.grad = own.grad.clone()
+        optimiser.step()
+        with torch.no_grad():
+            for parameter, own in zip(parameters, network.parameters(), strict=True):
+                own.copy_(parameter)
+    assert torch.allclose(worker.shared.weights, twin.weights, atol=1e-5)
+    assert not torch.allclose(worker.shared.weights, make_worker(spec).shared.weights, atol=1e-3)
+
+
+@pytest.mark.parametrize("memory", [0, 5])
+def test_a_training_that_was_killed_goes_on_as_if_it_had_not_been(flat, rules, tmp_path, memory):
+    tables = random_tables([flat], rules)
+    walks = make_walks(tables) if memory else None
+    maps = 2 if memory else 1
+    spec = make_spec(
+        tables, rules, walks=walks, memory=memory, maps=maps, total_steps=1200, validate_every=300
+    )
+    whole = training(spec, tmp_path / "whole")
+    whole.run()
+    assert len(whole.curve) == 5  # untrained, and four rounds
+    training(spec, tmp_path / "killed").run(rounds=2)
+    again = training(spec, tmp_path / "killed")
+    assert again.steps == 600
+    again.run()
+    assert torch.equal(again.shared.weights, whole.shared.weights)
+    assert torch.equal(again.shared.moments, whole.shared.moments)
+    times = ("steps_per_second",)
+    for one, other in zip(again.curve, whole.curve, strict=True):
+        assert {k: v for k, v in one.items() if k not in times} == {
+            k: v for k, v in other.items() if k not in times
+        }
+
+
+def test_two_workers_in_turn_give_the_same_bytes_every_time_and_a_round_at_a_time(
+    flat, rules, tmp_path
+):
+    options = {"workers": 2, "total_steps": 960, "validate_every": 480}
+    spec = make_spec(random_tables([flat], rules), rules, **options)
+    once, pieces = training(spec, tmp_path / "once"), training(spec, tmp_path / "pieces")
+    once.run()
+    pieces.run(rounds=1)
+    again = training(spec, tmp_path / "pieces")
+    again.run()
+    assert torch.equal(once.shared.weights, again.shared.weights)
+    alone = training(make_spec(spec.tables, rules, total_steps=960), tmp_path / "alone")
+    alone.run()
+    assert not torch.equal(once.shared.weights, alone.shared.weights)
+
+
+def test_workers_that_run_freely_apply_all_their_gradients(flat, rules, tmp_path):
+    options = {"workers": 2, "update_order": "free", "total_steps": 1200, "validate_every": 600}
+    free = training(make_spec(random_tables([flat], rules), rules, **options), tmp_path / "free")
+    free.run()
+    assert free.steps == 1200
+    assert {"entropy", "loss/value", "gradient_norm", "steps_per_second"} <= free.curve[-1].keys()
+
+
+def test_a_worker_that_dies_ends_the_run_and_leaves_the_last_checkpoint_whole(
+    flat, rules, tmp_path, monkeypatch
+):
+    options = {"workers": 2, "total_steps": 3_000_000, "validate_every": 300}
+    spec = make_spec(random_tables([flat], rules), rules, **options)
+    killed = []
+
+    class Murderous(worker_pool.SpawnedPool):
+        def run_chunk(self, updates, progress):
+            if len(read_checkpoint(tmp_path / LAST, "a" * 64)["curve"]) == 2:
+                killed.append(self._processes[1].pid)
+                os.kill(self._processes[1].pid, signal.SIGKILL)
+                time.sleep(0.1)
+            return super().run_chunk(updates, progress)
+
+    monkeypatch.setattr("avn.rl.training.start_pool", Murderous)
+    with pytest.raises(UserError, match=r"worker 1 died.*the last checkpoint is whole"):
+        training(spec, tmp_path).run()
+    assert killed
+    assert len(read_checkpoint(tmp_path / LAST, "a" * 64)["curve"]) == 2
+    assert training(spec, tmp_path).steps == 300
+
+
+def test_what_a_worker_refuses_is_said_in_one_line(flat, rules, tmp_path):
+    spec = make_spec(random_tables([flat], rules), rules, workers=2, total_steps=600, maps=1)
+    object.__setattr__(spec, "map_size", 5)  # a map that no agent fits on
+    with pytest.raises(UserError, match=r"mapper\.size|baseline\.map_width"):
+        training(spec, tmp_path).run()
+
+
+def test_more_workers_than_cores_are_warned_of(flat, rules, capsys, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    monkeypatch.setattr(worker_pool, "SpawnedPool", lambda *_: None)
+    spec = make_spec(random_tables([flat], rules), rules, workers=2)
+    worker_pool.start_pool(spec, None, [])
+    assert "2 workers share 1 cores" in capsys.readouterr().out
+
+
+def test_checkpoints_of_another_row_and_damaged_ones_are_refused(flat, rules, tmp_path):
+    spec = make_spec(random_tables([flat], rules), rules, total_steps=60, validate_every=60)
+    training(spec, tmp_path).run()
+    with pytest.raises(UserError, match="of another row or recipe"):
+        training(spec, tmp_path, made_from="b" * 64)
+    network = ActorCritic(spec.shape)
+    load_network(network, tmp_path / BEST, "a" * 64)
+    other = make_spec(spec.tables, rules, inputs=("visual_embedding",))
+    with pytest.raises(UserError, match="features or sizes"):
+        load_network(ActorCritic(other.shape), tmp_path / BEST, "a" * 64)
+    (tmp_path / BEST).write_bytes(b"no checkpoint")
+    with pytest.raises(UserError, match="damaged"):
+        load_network(network, tmp_path / BEST, "a" * 64)
+
+
+def test_the_best_on_validation_is_kept(flat, rules, tmp_path):
+    spec = make_spec(random_tables([flat], rules), rules, total_steps=600, validate_every=60)
+    kept = training(spec, tmp_path)
+    kept.run()
+    network = ActorCritic(spec.shape)
+    load_network(network, tmp_path / BEST, "a" * 64)
+    best = max(own["validation/spl"] for own in kept.curve)
+    assert measure(network)["validation/spl"] == pytest.approx(best)
