@@ -10,14 +10,15 @@ from omegaconf import DictConfig
 from avn.config.cli import command
 from avn.config.unread import refuse_unread
 from avn.core.progress import log
-from avn.pipeline import films
-from avn.pipeline.run import Evaluation, show_run
-from avn.pipeline.stage import build
 
 
 @command("eval")
 def main(cfg: DictConfig) -> Path:
     """Evaluate one row, or open its finished run, and print the table."""
+    from avn.pipeline import films
+    from avn.pipeline.run import Evaluation, show_run
+    from avn.pipeline.stage import build
+
     films.check(cfg)
     run = Evaluation(cfg)
     run.check()

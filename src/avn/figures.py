@@ -11,9 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avn.config.cli import plainly
-from avn.config.saved import read_config
-from avn.pipeline import replay
-from avn.pipeline.run_figures import draw_runs
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,7 +23,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "runs", nargs="+", type=Path, metavar="RUN", help="folders of runs; others stand beside"
     )
-    parser.add_argument("--show", default="typical", help=", ".join(replay.SHOWS))
+    parser.add_argument("--show", default="typical", help="which: typical, success or failure")
     parser.add_argument("--count", default=4, type=int, help="how many episodes to choose")
     parser.add_argument(
         "--episode", type=int, action="append", metavar="ROW", help="a row of episodes.csv, from 0"
@@ -35,6 +32,10 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _draw(options: argparse.Namespace) -> None:
+    from avn.config.saved import read_config
+    from avn.pipeline import replay
+    from avn.pipeline.run_figures import draw_runs
+
     runs = [replay.open_run(folder, read_config(folder)) for folder in options.runs]
     draw_runs(runs, options.show, options.count, options.episode)
 

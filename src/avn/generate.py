@@ -10,12 +10,13 @@ from omegaconf import DictConfig
 from avn.config.cli import command
 from avn.config.unread import refuse_unread
 from avn.core.progress import log
-from avn.pipeline.export import generate, settings_of
 
 
 @command("generate")
 def main(cfg: DictConfig) -> Path:
     """Make all scenes of the split and export what is asked for."""
+    from avn.pipeline.export import generate, settings_of
+
     refuse_unread("generate", cfg, settings_of(cfg))
     folder = generate(cfg)
     log(str(folder))

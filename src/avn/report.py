@@ -11,10 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avn.config.cli import plainly
-from avn.config.saved import read_config
 from avn.core.progress import log
-from avn.pipeline import replay
-from avn.pipeline.report_page import write_page
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -47,6 +44,10 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _report(options: argparse.Namespace) -> None:
+    from avn.config.saved import read_config
+    from avn.pipeline import replay
+    from avn.pipeline.report_page import write_page
+
     runs = [replay.open_run(folder, read_config(folder)) for folder in options.runs]
     log(str(write_page(runs, options.episodes, options.show, options.paths, options.output)))
 

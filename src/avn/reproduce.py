@@ -11,12 +11,13 @@ from avn.config.cli import command
 from avn.config.rows import compose_row
 from avn.config.unread import refuse_unread
 from avn.core.progress import log
-from avn.pipeline.reproduction import reproduce, settings_of
 
 
 @command("reproduce")
 def main(cfg: DictConfig) -> Path:
     """Make what is missing, run each row with each seed, and print the whole table."""
+    from avn.pipeline.reproduction import reproduce, settings_of
+
     rows = [compose_row(cfg, row) for row in dict.fromkeys(cfg.rows)]
     refuse_unread("reproduce", cfg, settings_of(rows))
     folder = reproduce(cfg, rows)

@@ -10,12 +10,13 @@ from omegaconf import DictConfig
 from avn.config.cli import command
 from avn.config.unread import refuse_unread
 from avn.core.progress import log
-from avn.pipeline.models import model_of, train_model
 
 
 @command("train")
 def main(cfg: DictConfig) -> Path:
     """Train the model, or open it where it is trained, and print what was measured."""
+    from avn.pipeline.models import model_of, train_model
+
     model = model_of(cfg)
     refuse_unread("train", cfg, {*model.read(), "model.name"})
     figures = train_model(model)

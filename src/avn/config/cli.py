@@ -23,8 +23,10 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from avn.config import audio_source, option_files, registry, renamed, spare, sweeps
-from avn.config.folder import conf_folder
+from avn.config import renamed, spare
+from avn.config.audio_source import quoted
+from avn.config.folder import conf_folder, without_folders
+from avn.config.help import help_text, is_asked
 from avn.core.errors import UserError
 
 # What is chosen for the training world, as Hydra spells it; apartments and acoustics follow the
@@ -40,7 +42,7 @@ USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLErr
 
 
 def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]], Callable[[], int]]:
-    """Make a command of a function that takes the composed config.
+    """Make a command of a function that takes the composed config; `--help` is answered at once.
 
     The command returns the exit code: 0, 1 for a fault of ours, 2 for a mistake of the
     user's, 130 when interrupted.
@@ -48,6 +50,8 @@ def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]],
 
     def decorate(task: Callable[[DictConfig], Path | None]) -> Callable[[], int]:
         def main() -> int:
+            if is_asked(sys.argv[1:]):
+                return plainly(f"avn.{config_name}", lambda: _help(config_name))
             return _run(config_name, task)
 
         return main
@@ -55,7 +59,16 @@ def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]],
     return decorate
 
 
+def _help(config_name: str) -> None:
+    _, folders = without_folders(sys.argv[1:])
+    print(help_text(config_name, folders, TRAINING))
+
+
 def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
+    # The schemas import torch and sweeps pandas. Help is asked for before, and needs neither; for
+    # the same reason each command imports what it needs of `pipeline/` where it calls it.
+    from avn.config import option_files, registry, sweeps
+
     registry.register()
     name = f"avn.{config_name}"
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises what it would print itself
@@ -153,7 +166,7 @@ def arrange(arguments: Iterable[str]) -> list[str]:
         elif equals and key in LIST_KEYS and not value.startswith("["):
             rest.append(f"{key}=[{value}]")
         elif equals and key in ("sound", "training.sounds"):
-            rest.append(f"{TRAINING.get(key, key)}={audio_source.quoted(value)}")
+            rest.append(f"{TRAINING.get(key, key)}={quoted(value)}")
         elif equals and key in TRAINING:
             rest.append(f"{TRAINING[key]}={value}")
         else:

@@ -1,11 +1,37 @@
-"""Where the config files lie."""
+"""Where the config files lie: ours, and those of `--config-dir MINE`."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+
+from avn.core.errors import UserError
+
+_OPTIONS = ("--config-dir", "-cd")
 
 
 def conf_folder() -> Path:
     """The folder of configs: beside the package in a wheel, at the top of a checkout."""
     packaged = Path(__file__).parents[1] / "conf"
     return packaged if packaged.is_dir() else Path(__file__).parents[3] / "conf"
+
+
+def without_folders(arguments: Iterable[str]) -> tuple[list[str], list[Path]]:
+    """A command line without the config folders of the user's, and these folders.
+
+    Raises
+    ------
+    UserError
+        Where one is no folder.
+    """
+    rest, folders, given = [], [], iter(arguments)
+    for argument in given:
+        option, equals, value = argument.partition("=")
+        if option not in _OPTIONS:
+            rest.append(argument)
+            continue
+        folder = value if equals else next(given, "")
+        if not Path(folder).expanduser().is_dir() or not folder:
+            raise UserError(f"{option}: '{folder}' is no folder; give one with config files")
+        folders.append(Path(folder).expanduser().resolve())
+    return rest, folders

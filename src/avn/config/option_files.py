@@ -14,13 +14,12 @@ from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import DictConfig, OmegaConf, open_dict
 
-from avn.config.folder import conf_folder
+from avn.config.folder import conf_folder, without_folders
 from avn.config.renamed import check_file
 from avn.config.schema import SCHEMAS
 from avn.config.signatures import is_option, with_signature
 from avn.core.errors import UserError
 
-_OPTIONS = ("--config-dir", "-cd")
 # The folders of the command line that is being run.
 _folders: list[str] = []
 
@@ -33,17 +32,8 @@ def take_folders(arguments: list[str]) -> list[str]:
     UserError
         Where one is no folder.
     """
-    _folders.clear()
-    rest, given = [], iter(arguments)
-    for argument in given:
-        option, equals, value = argument.partition("=")
-        if option not in _OPTIONS:
-            rest.append(argument)
-            continue
-        folder = value if equals else next(given, "")
-        if not Path(folder).expanduser().is_dir() or not folder:
-            raise UserError(f"{option}: '{folder}' is no folder; give one with config files")
-        _folders.append(str(Path(folder).expanduser().resolve()))
+    rest, folders = without_folders(arguments)
+    _folders[:] = map(str, folders)
     return rest
 
 

@@ -14,8 +14,6 @@ from hydra import compose
 from hydra.errors import ConfigCompositionException
 from omegaconf import DictConfig
 
-from avn.config.schema import BASES
-
 _UNKNOWN = re.compile(r"Could not override '([\w.]+)'")
 # Of the command line that is being run.
 _spare: list[str] = []
@@ -82,6 +80,8 @@ def _told(arguments: Sequence[str], error: BaseException, everything: bool) -> s
     """The argument whose setting an option does not have."""
     if (told := _UNKNOWN.search(str(error))) is None:
         return None
+    from avn.config.schema import BASES  # imports torch, which help does without
+
     key, cause = told[1], str(error.__cause__ or error)
     group = key.split(".")[0]
     if group not in BASES or not (everything or f"'{BASES[group].__name__}'" in cause):
