@@ -150,9 +150,8 @@ class EvalConfig(CoreConfig):
     seed: int = MISSING
     episodes: str = MISSING
     subset: str = MISSING
-    # Films made of the run afterwards: how many, and of which episodes. They enter no hash.
-    film: int = 0
-    film_show: str = "typical"
+    film: int = MISSING
+    film_show: str = MISSING
 
 
 @dataclass
