@@ -10,7 +10,7 @@ import yaml
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 
-from avn.config import schema
+from avn.config import registry
 from avn.config.folder import conf_folder
 from avn.pipeline.replay import SHOWS
 
@@ -80,7 +80,7 @@ def test_every_setting_stands_with_its_default_and_its_comment(command, name):
     said = one_line(shown(command, name))
     part = said.split("with their defaults:", 1)[1].split(" More:")[0]
     settings = dict(re.findall(r" ([\w.]+)=(\[.*?\]|\S*)", part))
-    schema.register()
+    registry.register()
     with initialize_config_dir(str(conf_folder()), version_base="1.3"):
         cfg = compose(name, overrides=["model=sound_cnn"] if name == "train" else [])
     for key, value in settings.items():

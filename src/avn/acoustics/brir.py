@@ -23,18 +23,42 @@ from avn.core.errors import UserError
 
 @dataclass
 class AcousticsConfig:
-    """How the world sounds; the node `acoustics` of the config."""
+    """Acoustics of a world, the node `acoustics` of the config.
 
-    name: str = "resonance"  # of the regime, as files and tables have it
-    direct_path: str = "transmission"  # or diffraction
-    seconds: float = 0.6  # length of the impulse responses
-    rate: int = 16000  # Hz
+    Attributes
+    ----------
+    name : str
+        Name of the regime, as files and tables have it.
+    direct_path : {"transmission", "diffraction"}
+        How the direct path gets to the listener: through walls, or round them.
+    seconds : float
+        Length of the impulse responses.
+    rate : int
+        Samples a second.
+    rays : int
+        Rays from each source.
+    depth : int
+        Reflections of a ray at most; time and loss end most of them before.
+    receiver_radius : float
+        Metres; a ray that passes so near to the ears is heard.
+    receiver_height, source_height : float
+        Metres above the floor.
+    air : bool
+        Whether air absorbs.
+    seed : int
+        Draws the directions of the rays.
+    """
+
+    name: str = "resonance"
+    direct_path: str = "transmission"
+    seconds: float = 0.6
+    rate: int = 16000
     rays: int = 10000
-    depth: int = 250  # reflections of a ray at most; time and loss end most of them before
-    receiver_radius: float = 0.25  # metres
-    receiver_height: float = 1.5  # metres
-    source_height: float = 1.0  # metres
-    air: bool = True  # whether air absorbs
+    depth: int = 250
+    receiver_radius: float = 0.25
+    receiver_height: float = 1.5
+    source_height: float = 1.0
+    air: bool = True
     seed: int = 0
 
 

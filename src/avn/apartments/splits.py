@@ -23,6 +23,7 @@ class SplitConfig:
     Attributes
     ----------
     name : str
+        Name of the split, as runs have it.
     folder : str, optional
         Frozen floor plans: a folder under the package's `assets/floor_plans`, or any folder.
         Files `train_*.json`, `val_*.json`; all others are test apartments.

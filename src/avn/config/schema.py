@@ -64,7 +64,13 @@ class MapperOption(NamedOption):
 
 @dataclass
 class ModelConfig:
-    """What `avn.train` trains."""
+    """What `avn.train` trains.
+
+    Attributes
+    ----------
+    name : str
+        Kind of network, a key of `avn.pipeline.models.MODELS`.
+    """
 
     name: str = MISSING
 
@@ -73,8 +79,14 @@ class ModelConfig:
 class AgentConfig:
     """A row of the table; a privileged one is shown the truth and is a bound, not an entry.
 
-    `oracle_inputs` names the parts in whose place it is given the truth: source_estimate,
-    local_patch, map, pose.
+    Attributes
+    ----------
+    name : str
+        Name of the row.
+    privileged : bool
+        Whether the agent is shown the truth; the row has to say so.
+    oracle_inputs : list of str
+        Parts in whose place it is given the truth: `source_estimate`, `local_patch`, `map`, `pose`.
     """
 
     name: str = MISSING
@@ -87,6 +99,17 @@ class TrainingConfig:
     """The world in which networks are trained: apartments, acoustics, microphone and sounds.
 
     Apartments and acoustics are those of the test world, unless they are chosen.
+
+    Attributes
+    ----------
+    scenes : SplitConfig
+        The split of the training world, an option of `split`.
+    acoustics : AcousticsConfig
+        The acoustics of the training world, an option of `acoustics`.
+    microphone : Option
+        The microphone of the training world, an option of `microphone`.
+    sounds : dict of str to str
+        The sounds of the training world, an option of `sound`.
     """
 
     scenes: SplitConfig = _TEST_SPLIT
@@ -97,7 +120,13 @@ class TrainingConfig:
 
 @dataclass
 class CoreConfig:
-    """What every command has: the groups, and machine settings."""
+    """What every command has: the groups, and machine settings.
+
+    Attributes
+    ----------
+    sound : dict of str to str
+        For each name of a sound the recording: one that the package ships, or a file's path.
+    """
 
     split: SplitConfig = MISSING
     acoustics: AcousticsConfig = MISSING

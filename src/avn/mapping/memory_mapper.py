@@ -39,6 +39,8 @@ class MemoryMapper(Mapper):
     top : int
         Entries that an estimate of the place is made of.
     localisation : {"retrieval", "retrieval+odometry"}
+        Whether it takes itself to be where the memory says, or where odometry since the start
+        says, on a map over which the walk is laid.
     local_patches : bool
         Whether the map also takes in which squares look free, in the walk and later.
     edges : {"consecutive", "adjacent"}

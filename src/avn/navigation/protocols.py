@@ -26,6 +26,7 @@ class Protocol:
     Attributes
     ----------
     name : str
+        Name of the protocol, as tables have it.
     goal : {"box", "radius"}
         Where an agent succeeds: in the 3 x 3 cells around the source that are at most 2 moves
         away from it (so that a cell behind a wall does not count), or within `radius` metres of

@@ -24,8 +24,13 @@ class SourceErrorModel:
     Attributes
     ----------
     sigma : float
-        Metres.
-    sigma_per_metre, front_back_prob, outlier_prob : float
+        Metres of the standard deviation that do not depend on the distance.
+    sigma_per_metre : float
+        Part of the distance that is added to the standard deviation.
+    front_back_prob : float
+        Part of the weight that lies on the mirror image behind the agent.
+    outlier_prob : float
+        Part of the weight that lies anywhere.
     weight : float
         What one estimate counts; less than 1, since the errors of one place repeat.
     """
