@@ -15,10 +15,9 @@ from avn.dataset.source_locations import relative_locations
 class FreeFieldBrirs:
     """One arrival an ear, with level and delay after the source's direction and distance."""
 
-    samples = 400
-
-    def __init__(self, locations: Tensor) -> None:
-        self.locations = locations
+    def __init__(self, locations: Tensor, rate: int) -> None:
+        self.locations, self.scale = locations, rate / 16000
+        self.samples = round(400 * self.scale)
 
     def gather(self, source: Tensor, state: Tensor) -> Tensor:
         where = self.locations[source, state]
@@ -28,7 +27,9 @@ class FreeFieldBrirs:
         ears = []
         for sign in (-1.0, 1.0):
             gain = (1 + 0.6 * sign * side) * (1 + 0.3 * front) / distance
-            ears.append(gain[:, None] * torch.sinc(time - 40 + 6 * sign * side[:, None]))
+            ears.append(
+                gain[:, None] * torch.sinc(time - self.scale * (40 - 6 * sign * side[:, None]))
+            )
         return torch.stack(ears, 1)
 
 
@@ -40,6 +41,7 @@ class SyntheticScene:
     grid: Grid
     sources: np.ndarray
     in_sight: np.ndarray
+    rate: int = 16000
 
     @property
     def name(self) -> str:
@@ -49,11 +51,13 @@ class SyntheticScene:
     def brirs(self) -> FreeFieldBrirs:
         lattice = torch.from_numpy(self.grid.lattice.astype(np.int64))
         return FreeFieldBrirs(
-            relative_locations(lattice, torch.from_numpy(self.sources.astype(np.int64)))
+            relative_locations(lattice, torch.from_numpy(self.sources.astype(np.int64))), self.rate
         )
 
 
-def synthetic_scene(name: str = "two_rooms", width: float = 2.0) -> SyntheticScene:
+def synthetic_scene(
+    name: str = "two_rooms", width: float = 2.0, rate: int = 16000
+) -> SyntheticScene:
     """Two rooms side by side, each `width` wide and 2 m deep, with a source in each."""
     looks = ("parquet", "plaster", "ceiling_plaster")
     plan = FloorPlan(
@@ -64,11 +68,13 @@ def synthetic_scene(name: str = "two_rooms", width: float = 2.0) -> SyntheticSce
     )
     grid = build_grid(plan)
     sources = source_cells(plan, grid)
-    return SyntheticScene(plan, grid, sources, grid.rooms[None] == grid.rooms[sources][:, None])
+    in_sight = grid.rooms[None] == grid.rooms[sources][:, None]
+    return SyntheticScene(plan, grid, sources, in_sight, rate)
 
 
-def synthetic_sounds() -> DrySounds:
+def synthetic_sounds(rate: int = 16000) -> DrySounds:
     """Two noises, one of them dull."""
-    noise = np.random.default_rng(0).standard_normal((2, 20000))
+    noise = np.random.default_rng(0).standard_normal((2, 5 * rate // 4))
     noise[1] = np.convolve(noise[1], np.hanning(9), mode="same")
-    return DrySounds({"hiss": noise[0].astype(np.float32), "hum": noise[1].astype(np.float32)})
+    bank = {"hiss": noise[0].astype(np.float32), "hum": noise[1].astype(np.float32)}
+    return DrySounds(bank, rate=rate)

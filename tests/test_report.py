@@ -160,7 +160,7 @@ def test_what_comes_from_names_is_shown_and_never_run(browser, tmp_path):
     plan = {"image": pixel, "left": 0.0, "top": 4.0, "width": 4.0, "height": 4.0}
     episode = {"title": evil, "outcome": evil, "goal": [1, 1], "path": [[1, 1, 0], [1, 2, 0]]}
     episode |= {"action": [0], "collided": [0, 0], "heard": None, "belief": None, "memory": None}
-    episode |= {"sound": page_media.sound_url(np.zeros((32000, 2), dtype=np.float32))}
+    episode |= {"sound": page_media.sound_url(np.zeros((32000, 2), dtype=np.float32), 16000)}
     episode |= {"run": 0, "plan": 0, "views": [0, 0], "twins": [0]}
     html = render(evil, [run], [plan], [pixel], [episode])
     path = tmp_path / "evil.html"

@@ -4,9 +4,10 @@ import multiprocessing
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
 
 from avn.acoustics import materials
-from avn.acoustics.band_filters import HALF, band_firs, band_weights, minimum_phase
+from avn.acoustics.band_filters import band_firs, band_weights, half_length, minimum_phase
 from avn.acoustics.brir import (
     AcousticsConfig,
     assets_hash,
@@ -105,7 +106,7 @@ def test_turning_the_agent_is_turning_the_world_for_the_reverberation() -> None:
 
 
 def test_an_event_turned_with_its_listener_sounds_the_same() -> None:
-    binaural = Binaural.prepare(head_filters(16000), 4800)
+    binaural = Binaural.prepare(head_filters(16000), 4800, 16000)
     east = np.array([0.8, 0.36, 0.48])
     one, _ = binaural_responses(one_event([1.0] * 6, list(east)), binaural, 16000)
     moved = list(turned_points(east))
@@ -120,7 +121,9 @@ def test_a_reflection_sounds_like_a_first_arrival_from_there() -> None:
     first = render_direct_paths(np.zeros((0, 4)), source, ear, CONFIG)
     way = float(np.linalg.norm(source - ear[0]))
     event = one_event([1 / (4 * np.pi * way**2)] * 6, list((source - ear[0]) / way), metres=way)
-    samples, scale = binaural_responses(event, Binaural.prepare(head_filters(16000), 4800), 16000)
+    samples, scale = binaural_responses(
+        event, Binaural.prepare(head_filters(16000), 4800, 16000), 16000
+    )
     heard = samples[0] * scale[0]
     wanted = np.zeros_like(heard)
     onset, taps = int(first.onset[0]), first.samples.shape[-1]
@@ -130,8 +133,8 @@ def test_a_reflection_sounds_like_a_first_arrival_from_there() -> None:
 
 def test_bands_sum_to_a_single_sample() -> None:
     firs = band_firs(16000)
-    unit = np.zeros(2 * HALF + 1)
-    unit[HALF] = 1
+    unit = np.zeros(2 * half_length(16000) + 1)
+    unit[half_length(16000)] = 1
     assert firs.sum(axis=0) == pytest.approx(unit, abs=1e-6)
     assert band_weights(np.linspace(0, 8000, 500)).sum(axis=0) == pytest.approx(np.ones(500))
 
@@ -157,7 +160,7 @@ def test_the_omnidirectional_channel_keeps_the_traced_energy() -> None:
         shoebox(ROOM, "plaster"), SOURCE, np.array([[3.0, 2.0, 1.5], [4.0, 3.0, 1.5]]),
         rays=8000, seconds=0.3, absorption=np.full((1, 6), 0.2),
     )  # fmt: skip
-    omni = ambisonic_responses(events, 0, 2, 5000, 16000)[:, 0, HALF : HALF + 4800]
+    omni = ambisonic_responses(events, 0, 2, 5000, 16000)[:, 0, half_length(16000) :][:, :4800]
     traced = events.histogram()
     assert decibel((omni**2).sum(axis=1)) == pytest.approx(
         decibel(traced.mean(axis=2).sum(axis=1)), abs=1.0
@@ -198,7 +201,9 @@ def test_listeners_in_other_company_hear_the_same() -> None:
     config = dataclasses.replace(CONFIG, rays=300)
     everyone = render_source(surfaces, SOURCE, ears, config)
     few = trace(surfaces, SOURCE, ears[:3], rays=300, seconds=0.3)
-    samples, scale = binaural_responses(few, Binaural.prepare(head_filters(16000), 4800), 16000)
+    samples, scale = binaural_responses(
+        few, Binaural.prepare(head_filters(16000), 4800, 16000), 16000
+    )
     assert np.abs(samples.astype(int) - everyone.samples[:3]).max() <= 1
     assert scale == pytest.approx(everyone.scale[:3], rel=1e-5)
 
@@ -270,3 +275,33 @@ def test_the_hash_of_the_tables_follows_what_they_hold(monkeypatch: pytest.Monke
     louder = materials.absorption(materials.NAMES) * 0.99
     monkeypatch.setattr(materials, "absorption", lambda names: louder)
     assert assets_hash() != before
+
+
+@pytest.mark.parametrize("rate", [8000, 48000])
+def test_a_response_has_the_same_spectrum_at_every_sampling_rate(rate: int) -> None:
+    """The direct path up to 2.5 kHz, against that at 16 kHz."""
+    source, receiver = np.array([0.0, 3.0, 1.0]), np.array([[0.0, 0.0, 1.5]])
+    frequencies = np.arange(200, 2501, 100)
+
+    def levels(own: int) -> np.ndarray:
+        config = dataclasses.replace(CONFIG, rate=own)
+        first = render_direct_paths(np.zeros((0, 4)), source, receiver, config)
+        ears = first.samples[0, 0] * first.scale[0].astype(np.float64)
+        wave = np.exp(-2j * np.pi * np.outer(np.arange(ears.shape[-1]), frequencies) / own)
+        return 20 * np.log10(np.abs(ears @ wave))
+
+    np.testing.assert_allclose(levels(rate), levels(16000), atol=0.3)
+
+
+@pytest.mark.parametrize("rate", [8000, 48000])
+def test_reverberation_has_the_same_decay_and_level_at_every_sampling_rate(rate: int) -> None:
+    receivers, energies = np.array([[4.0, 3.0, 1.5], [2.0, 3.0, 1.5]]), []
+    for own in (16000, rate):
+        config = dataclasses.replace(CONFIG, rate=own)
+        tail = render_source(shoebox(ROOM, "plaster"), SOURCE, receivers, config)
+        samples = tail.samples[:, 0, 0] * tail.scale[:, None].astype(np.float64)
+        low = sosfiltfilt(butter(4, (300, 2500), "bandpass", fs=own, output="sos"), samples)
+        # the spectrum does not depend on the rate, and its energy is spread over so many samples
+        blocks = (low**2).reshape(len(low), -1, own // 20).sum(axis=-1) * own / 16000
+        energies.append(10 * np.log10(blocks[:, :5].mean(axis=0)))
+    np.testing.assert_allclose(energies[1], energies[0], atol=0.7)

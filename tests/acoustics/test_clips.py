@@ -8,13 +8,12 @@ import soundfile
 import torch
 
 from avn.acoustics.clips import (
-    CLIP_SAMPLES,
     ClipRenderer,
     DrySounds,
     brir_spectra,
     export_wav,
 )
-from avn.acoustics.dry_sounds import BUILTIN, load_sounds
+from avn.acoustics.dry_sounds import BUILTIN, RATE, load_sounds
 from avn.acoustics.microphone import Microphone
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
@@ -34,7 +33,7 @@ def bank() -> DrySounds:
 
 def looped_tone(frequency: float, samples: int) -> np.ndarray:
     """A sine of unit RMS."""
-    wave = np.sin(2 * np.pi * frequency * np.arange(samples) / CLIP_SAMPLES) * 2**0.5
+    wave = np.sin(2 * np.pi * frequency * np.arange(samples) / RATE) * 2**0.5
     return wave.astype(np.float32)
 
 
@@ -74,16 +73,16 @@ def test_a_steady_tone_does_not_betray_the_time_of_flight(frequency: float) -> N
 
 
 def test_a_tone_of_whole_cycles_has_no_seam() -> None:
-    sounds = DrySounds({"tone": looped_tone(440.0, 2 * CLIP_SAMPLES)})
+    sounds = DrySounds({"tone": looped_tone(440.0, 2 * RATE)})
     clips = many(ClipRenderer(sounds, QUIET, 0, "eval"), 20)
     spectra = torch.fft.rfft(clips).abs() ** 2
     assert (spectra[..., 440] / spectra.sum(-1)).min() > 0.99999
 
 
 def test_the_seam_of_a_second_is_smooth_and_lies_anywhere() -> None:
-    sounds = DrySounds({"tone": looped_tone(100.5, 2 * CLIP_SAMPLES)})  # half a cycle is left over
+    sounds = DrySounds({"tone": looped_tone(100.5, 2 * RATE)})  # half a cycle is left over
     clips = many(ClipRenderer(sounds, QUIET, 0, "eval"), 200)[:, 0]
-    steepest = 2**0.5 * 2 * np.pi * 100.5 / CLIP_SAMPLES
+    steepest = 2**0.5 * 2 * np.pi * 100.5 / RATE
     rolled = torch.cat([clips, clips[:, :1]], dim=1)
     assert rolled.diff(dim=1).abs().max() < 1.5 * steepest
     quietest = clips.square().unflatten(-1, (100, -1)).mean(-1).argmin(dim=1)
@@ -100,7 +99,7 @@ def test_every_sound_is_as_loud_on_average(bank: DrySounds) -> None:
 
 
 def test_a_sparse_recording_is_heard_in_every_take() -> None:
-    sparse = np.zeros(20 * CLIP_SAMPLES, dtype=np.float32)
+    sparse = np.zeros(20 * RATE, dtype=np.float32)
     sparse[50_000:56_000] = np.random.default_rng(0).standard_normal(6000)
     sparse /= np.sqrt(np.mean(sparse**2))
     clips = many(ClipRenderer(DrySounds({"bark": sparse}), QUIET, 0, "eval"), 100)
@@ -111,17 +110,17 @@ def test_a_sparse_recording_is_heard_in_every_take() -> None:
 
 def test_convolution_is_circular_and_longer_responses_fold() -> None:
     generator = np.random.default_rng(1)
-    sounds = DrySounds({"noise": generator.standard_normal(CLIP_SAMPLES).astype(np.float32)})
+    sounds = DrySounds({"noise": generator.standard_normal(RATE).astype(np.float32)})
     renderer = ClipRenderer(sounds, QUIET, 0, "eval")
     brir = torch.from_numpy(generator.standard_normal((1, 2, 20_000)).astype(np.float32)) * 0.01
     dry = same(renderer, delays([0]))[0, 0].double().numpy()
     wet = same(renderer, brir)[0, 1].double().numpy()
     endless = np.convolve(np.tile(dry, 4), brir[0, 1].double().numpy())
-    np.testing.assert_allclose(wet, endless[3 * CLIP_SAMPLES : 4 * CLIP_SAMPLES], atol=1e-4)
+    np.testing.assert_allclose(wet, endless[3 * RATE : 4 * RATE], atol=1e-4)
 
 
 def test_the_noise_floor_has_its_level_and_differs_between_ears_and_takes() -> None:
-    sounds = DrySounds({"tone": looped_tone(440.0, CLIP_SAMPLES)})
+    sounds = DrySounds({"tone": looped_tone(440.0, RATE)})
     renderer = ClipRenderer(sounds, Microphone(noise_rms=0.02), 0, "eval")
     noise = many(renderer, 30, brir=torch.zeros(1, 2, 100)).flatten(0, 1)
     assert noise.square().mean().sqrt() == pytest.approx(0.02, rel=0.01)
@@ -195,7 +194,7 @@ def test_export_writes_a_whole_file_of_two_channels(tmp_path: Path, bank: DrySou
     target = tmp_path / "new folder" / "clip.wav"
     export_wav(target, clip)
     samples, rate = soundfile.read(target)
-    assert rate == CLIP_SAMPLES
+    assert rate == RATE
     np.testing.assert_allclose(samples.T, 0.1 * clip.numpy(), atol=1e-4)
     assert [path.name for path in target.parent.iterdir()] == ["clip.wav"]
 

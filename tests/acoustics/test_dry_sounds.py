@@ -194,3 +194,22 @@ def test_quiet_and_huge_float_files_keep_their_shape(tmp_path: Path) -> None:
         soundfile.write(path, factor * tone(500, 1, RATE), RATE, subtype="FLOAT")
         samples[name] = read_sound(path)
     np.testing.assert_allclose(samples["quiet"], samples["huge"], atol=1e-5)
+
+
+@pytest.mark.parametrize("rate", [8000, 48000])
+def test_a_sound_keeps_its_pitch_and_level_at_another_rate(tmp_path: Path, rate: int) -> None:
+    path = tmp_path / "tone.wav"
+    soundfile.write(path, tone(700, 1.5, 44100), 44100)
+    samples = read_sound(path, rate)
+    assert len(samples) == pytest.approx(1.5 * rate, abs=1)
+    assert np.sqrt(np.mean(samples.astype(np.float64) ** 2)) == pytest.approx(1, abs=1e-4)
+    spectrum = np.abs(np.fft.rfft(samples))
+    assert np.fft.rfftfreq(len(samples), 1 / rate)[spectrum.argmax()] == pytest.approx(700, abs=2)
+
+
+def test_what_a_low_rate_cannot_hold_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "high.wav"
+    soundfile.write(path, tone(6000, 1, 48000), 48000)
+    assert len(read_sound(path)) == RATE
+    with pytest.raises(UserError, match="silent below 4 kHz; take one that microphones of 8 kHz"):
+        read_sound(path, 8000)

@@ -60,25 +60,21 @@ def test_an_agent_hears_in_front_what_lies_where_it_faces(heading: int) -> None:
         )
 
 
-def test_a_plane_wave_from_the_front_has_unit_energy_at_any_rate() -> None:
+def test_a_plane_wave_from_the_front_has_unit_energy() -> None:
     assert (ears(0) ** 2).sum(axis=1).mean() == pytest.approx(1, rel=1e-5)
-    fine = load_sh_hrirs().filters(48000)[0].astype(np.float64)
-    front = np.einsum("ect,c->et", fine, sh([0.0, 1.0, 0.0]))
-    assert (front**2).sum(axis=1).mean() == pytest.approx(1, rel=1e-5)
 
 
-def test_resampling_keeps_the_shape_of_the_spectrum() -> None:
-    coarse, fine = (
-        load_sh_hrirs().filters(rate)[0, 0].astype(np.float64) for rate in (RATE, 48000)
-    )
-    frequencies = np.arange(250, 5501, 250)
+@pytest.mark.parametrize("rate", [8000, 48000])
+def test_resampling_keeps_the_spectrum_and_its_level(rate: int) -> None:
+    frequencies = np.arange(250, 2501 if rate < RATE else 5501, 250)
     responses = []
-    for filters, rate in ((coarse, RATE), (fine, 48000)):
-        wave = np.exp(-2j * np.pi * np.outer(np.arange(filters.shape[-1]), frequencies) / rate)
+    for own in (RATE, rate):
+        filters = load_sh_hrirs().filters(own)[0, 0].astype(np.float64)
+        wave = np.exp(-2j * np.pi * np.outer(np.arange(filters.shape[-1]), frequencies) / own)
         responses.append(np.abs(filters @ wave))
-    ratio = responses[0] / np.maximum(responses[1], 1e-9)
     audible = responses[1] > 0.2
-    assert np.ptp(20 * np.log10(ratio[audible])) < 0.2
+    ratio = responses[0][audible] / responses[1][audible]
+    np.testing.assert_allclose(20 * np.log10(ratio), 0.0, atol=0.5 if rate < RATE else 0.2)
 
 
 def test_a_turn_of_the_head_turns_the_sound_field_the_other_way() -> None:

@@ -29,11 +29,11 @@ def recipe(**changes: Any) -> DictConfig:
     return config
 
 
-def build(**changes: Any) -> tuple[SoundData, SoundCnn]:
+def build(rate: int = 16000, **changes: Any) -> tuple[SoundData, SoundCnn]:
     config = recipe(**changes)
-    scenes = [synthetic_scene("a")], [synthetic_scene("b", 2.5)]
-    data = SoundData(*scenes, synthetic_sounds(), Microphone(), typed(config))
-    return data, build_object("sound_model", config)
+    scenes = [synthetic_scene("a", rate=rate)], [synthetic_scene("b", 2.5, rate)]
+    data = SoundData(*scenes, synthetic_sounds(rate), Microphone(), typed(config))
+    return data, build_object("sound_model", config, rate=rate)
 
 
 @pytest.fixture(scope="module")
@@ -46,16 +46,26 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
     return torch.load(path, weights_only=True)["state_dict"]
 
 
+@pytest.mark.parametrize("rate", [8000, 48000])
+def test_it_does_at_another_sampling_rate(tmp_path: Path, rate: int) -> None:
+    metrics = fit(*build(rate, epochs=10), tmp_path)
+    assert metrics["loss/training"] < 0.8 * error_before(rate)
+    assert metrics["bearing_deg/training/all/all"] < 45  # 90 is chance
+
+
 def test_training_lowers_the_error(run: tuple[Path, dict[str, Any]]) -> None:
     _, metrics = run
-    data, untrained = build()
+    assert metrics["loss/training"] < error_before()
+    assert metrics["epochs"] == 4
+
+
+def error_before(rate: int = 16000) -> float:
+    data, untrained = build(rate)
     batches = list(data.val_dataloader()[1])
     with torch.inference_mode():
         heard = torch.cat([untrained.eval().estimate(batch["pictures"]) for batch in batches])
     target = torch.cat([batch["target"] for batch in batches])
-    before = torch.nn.functional.mse_loss(heard, target)
-    assert metrics["loss/training"] < float(before)
-    assert metrics["epochs"] == 4
+    return float(torch.nn.functional.mse_loss(heard, target))
 
 
 def test_metrics_are_by_split_sight_and_sound(run: tuple[Path, dict[str, Any]]) -> None:

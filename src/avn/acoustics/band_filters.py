@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from avn.acoustics.materials import BANDS
 
-HALF = 160  # samples on either side of the middle of a band filter
-_GRID = 4096  # points of the spectra from which filters are made
+HALF_SECONDS = 0.01  # on either side of the middle of a band filter
+_GRID_SECONDS = 0.256  # of the spectra from which filters are made
 _KAISER = 3.0  # shape of the window: a compromise of edge and ripple
 
 
@@ -30,13 +30,23 @@ def band_weights(frequencies: NDArray[np.floating]) -> NDArray[np.float64]:
     return weights
 
 
+def half_length(rate: int) -> int:
+    """Samples on either side of the middle of a band filter at a sampling rate."""
+    return round(HALF_SECONDS * rate)
+
+
+def _grid(rate: int) -> int:
+    """Points of the spectra from which filters are made, a power of 2."""
+    return 1 << (round(_GRID_SECONDS * rate) - 1).bit_length()
+
+
 @lru_cache(maxsize=4)
 def band_firs(rate: int) -> NDArray[np.float32]:
-    """Symmetric filters of the bands, shape (6, 2 HALF + 1); they sum to a unit impulse."""
-    spectrum = band_weights(np.fft.rfftfreq(_GRID, 1 / rate))
+    """Symmetric filters of the bands, (6, 2 `half_length` + 1); they sum to a unit impulse."""
+    spectrum = band_weights(np.fft.rfftfreq(_grid(rate), 1 / rate))
     response = np.fft.fftshift(np.fft.irfft(spectrum, axis=1), axes=1)
-    middle = _GRID // 2
-    firs = response[:, middle - HALF : middle + HALF + 1] * np.kaiser(2 * HALF + 1, _KAISER)
+    middle, half = _grid(rate) // 2, half_length(rate)
+    firs = response[:, middle - half : middle + half + 1] * np.kaiser(2 * half + 1, _KAISER)
     result = firs.astype(np.float32)
     result.setflags(write=False)
     return result
@@ -58,12 +68,13 @@ def minimum_phase(gains: NDArray[np.float64], rate: int, taps: int) -> NDArray[n
         Nothing sounds before its time: sample 0 is the start. Made by folding the cepstrum
         (Oppenheim and Schafer, *Discrete-Time Signal Processing*, section 13.8).
     """
-    weights = band_weights(np.fft.rfftfreq(_GRID, 1 / rate))
+    grid = _grid(rate)
+    weights = band_weights(np.fft.rfftfreq(grid, 1 / rate))
     cepstrum = np.fft.irfft(np.log(np.maximum(gains, 1e-6) @ weights), axis=1)
     folded = np.zeros_like(cepstrum)
     folded[:, 0] = cepstrum[:, 0]
-    folded[:, 1 : _GRID // 2] = 2 * cepstrum[:, 1 : _GRID // 2]
-    folded[:, _GRID // 2] = cepstrum[:, _GRID // 2]
+    folded[:, 1 : grid // 2] = 2 * cepstrum[:, 1 : grid // 2]
+    folded[:, grid // 2] = cepstrum[:, grid // 2]
     response = np.fft.irfft(np.exp(np.fft.rfft(folded, axis=1)), axis=1)[:, :taps]
     fade = np.ones(taps)
     fade[taps // 2 :] = np.cos(0.5 * np.pi * np.linspace(0, 1, taps - taps // 2)) ** 2

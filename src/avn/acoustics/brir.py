@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.acoustics import materials
-from avn.acoustics.direct_path import LOSS_TAPS, REGIMES, DirectPaths, find_paths, render_paths
-from avn.acoustics.dry_sounds import RATE
+from avn.acoustics.direct_path import LOSS_SECONDS, REGIMES, DirectPaths, find_paths, render_paths
 from avn.acoustics.hrtf import load_sh_hrirs
 from avn.acoustics.rendering import Binaural, binaural_responses
 from avn.acoustics.tracer import Events, trace
@@ -34,7 +33,7 @@ class AcousticsConfig:
     seconds : float
         Length of the impulse responses.
     rate : int
-        Samples a second.
+        Samples a second, of impulse responses, of clips and of what networks hear.
     rays : int
         Rays from each source.
     depth : int
@@ -79,7 +78,7 @@ def check_config(config: AcousticsConfig, node: str = "acoustics") -> AcousticsC
         )
     limits: dict[str, tuple[float, float]] = {
         "seconds": (0.05, 10.0),
-        "rate": (RATE, RATE),  # of clips and of what networks hear
+        "rate": (8000, 48000),
         "rays": (100, 10_000_000),
         "depth": (1, 100_000),
         "receiver_radius": (0.01, 2.0),
@@ -122,7 +121,7 @@ def head_filters(rate: int) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=4)
 def _binaural(rate: int, samples: int) -> Binaural:
-    return Binaural.prepare(head_filters(rate), samples)
+    return Binaural.prepare(head_filters(rate), samples, rate)
 
 
 def assets_hash() -> str:
@@ -206,7 +205,7 @@ def render_direct_paths(
     """
     paths = find_paths(config.direct_path, walls, source, listeners)
     # One length in a regime, whether or not a source has listeners behind a wall.
-    loss_taps = LOSS_TAPS if config.direct_path == "diffraction" else 1
+    loss_taps = round(LOSS_SECONDS * config.rate) if config.direct_path == "diffraction" else 1
     return render_paths(paths, head_filters(config.rate), config.rate, loss_taps)
 
 

@@ -26,11 +26,10 @@ from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
 
-CLIP_SAMPLES = RATE
 PURPOSES = ("train", "eval")
 
-FADE_SAMPLES = 160  # 10 ms over which the end of a second passes into its beginning
-HOP = 160  # grid of the places where a second may begin
+FADE_SECONDS = 0.01  # over which the end of a second passes into its beginning
+HOP_SECONDS = 0.01  # grid of the places where a second may begin
 LEAST_LEVEL = 0.5  # of the usual level of the sound: -6 dB
 NOISE_SAMPLES = 1 << 19  # 33 s of noise an ear
 EXPORT_FACTOR = 0.1
@@ -47,20 +46,24 @@ class DrySounds:
     Parameters
     ----------
     sounds : mapping
-        Name to float array (n,) at 16 kHz with n >= 16000, as `load_sounds` gives it.
+        Name to float array (n,) with n >= rate, as `load_sounds` gives it.
     device : torch.device or str
-        Where the bank lies and seconds are cut.
+        Device of the bank and of the seconds that are cut.
+    rate : int
+        Sampling rate of the sounds in Hz; a clip is so many samples.
     """
 
     def __init__(
         self,
         sounds: Mapping[str, NDArray[np.float32]],
         device: torch.device | str = "cpu",
+        rate: int = RATE,
     ) -> None:
-        self.names = tuple(sounds)
+        self.names, self.rate = tuple(sounds), rate
+        self._fade = fade_samples(rate)
         waves, places, offset = [], [], 0
         for samples in sounds.values():
-            looped, starts = _prepare(samples)
+            looped, starts = _prepare(samples, rate)
             waves.append(looped)
             places.append(starts + offset)
             offset += len(looped)
@@ -75,8 +78,8 @@ class DrySounds:
             for name in self.names
         ]
         self.keys = torch.tensor(keys, dtype=torch.int64, device=device)
-        ramp = torch.arange(1, FADE_SAMPLES + 1, dtype=torch.float32, device=device)
-        self._fade_in = ramp / (FADE_SAMPLES + 1)
+        ramp = torch.arange(1, self._fade + 1, dtype=torch.float32, device=device)
+        self._fade_in = ramp / (self._fade + 1)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -94,16 +97,17 @@ class DrySounds:
 
         Returns
         -------
-        float32 tensor, shape (N, 16000)
+        float32 tensor, shape (N, rate)
             Its last sample leads over into its first: a cross-fade of 10 ms takes the seam away.
         """
+        rate, fade = self.rate, self._fade
         starts = self._places[sound, place % self._counts[sound]]
-        cut = self._wave.unfold(0, CLIP_SAMPLES + FADE_SAMPLES, 1)[starts]
-        second, beyond = cut[:, :CLIP_SAMPLES], cut[:, CLIP_SAMPLES:]
-        second[:, :FADE_SAMPLES].mul_(self._fade_in).add_(beyond * (1 - self._fade_in))
+        cut = self._wave.unfold(0, rate + fade, 1)[starts]
+        second, beyond = cut[:, :rate], cut[:, rate:]
+        second[:, :fade].mul_(self._fade_in).add_(beyond * (1 - self._fade_in))
         twice = torch.cat([second, second], dim=1).flatten()
-        rows = torch.arange(len(sound), device=twice.device) * (2 * CLIP_SAMPLES)
-        return twice.unfold(0, CLIP_SAMPLES, 1)[rows + phase % CLIP_SAMPLES]
+        rows = torch.arange(len(sound), device=twice.device) * (2 * rate)
+        return twice.unfold(0, rate, 1)[rows + phase % rate]
 
 
 class ClipRenderer:
@@ -146,8 +150,9 @@ class ClipRenderer:
 
         Parameters
         ----------
-        spectra : complex64 tensor, shape (N, 2, 8001)
-            `brir_spectra` of each clip's BRIR; with ``index`` (M, 2, 8001), each used by many.
+        spectra : complex64 tensor, shape (N, 2, rate / 2 + 1)
+            `brir_spectra` of each clip's BRIR; with ``index`` (M, 2, rate / 2 + 1), each
+            used by many.
         clip : ClipId
             Which clips. Their sound is an index into the bank's names; all else only enters the
             draw.
@@ -156,7 +161,7 @@ class ClipRenderer:
 
         Returns
         -------
-        float32 tensor, shape (N, 2, 16000)
+        float32 tensor, shape (N, 2, rate)
             Left and right ear. 16 to 128 clips a call are fastest on a CPU, for its caches.
         """
         sound = clip.sound
@@ -165,17 +170,17 @@ class ClipRenderer:
         place, phase, left, right = (integers(key, draw) for draw in range(4))
         dry = torch.fft.rfft(self.sounds.seconds(sound, place, phase))
         used = spectra if index is None else spectra[index]
-        clips = torch.fft.irfft(dry[:, None, :] * used, n=CLIP_SAMPLES)
+        clips = torch.fft.irfft(dry[:, None, :] * used, n=self.sounds.rate)
         draws = (left, right)
 
         def noise(ear: int) -> Tensor:
-            pieces = self._noise[ear].unfold(0, CLIP_SAMPLES, 1)
+            pieces = self._noise[ear].unfold(0, self.sounds.rate, 1)
             return pieces[draws[ear] % len(pieces)]
 
         return self.microphone.record(clips, noise)
 
 
-def brir_spectra(brirs: Tensor) -> Tensor:
+def brir_spectra(brirs: Tensor, rate: int = RATE) -> Tensor:
     """Spectra of BRIRs over one second, for `ClipRenderer.render`.
 
     Parameters
@@ -183,20 +188,22 @@ def brir_spectra(brirs: Tensor) -> Tensor:
     brirs : float32 tensor, shape (N, 2, T)
         A response longer than a second is folded onto one, which is exact in the steady state of
         a sound that repeats every second.
+    rate : int
+        Sampling rate in Hz, samples of a clip.
 
     Returns
     -------
-    complex64 tensor, shape (N, 2, 8001)
+    complex64 tensor, shape (N, 2, rate / 2 + 1)
     """
     samples = brirs.shape[-1]
-    if samples > CLIP_SAMPLES:
-        folds = -(-samples // CLIP_SAMPLES)
-        padded = pad(brirs, (0, folds * CLIP_SAMPLES - samples))
-        brirs = padded.unflatten(-1, (folds, CLIP_SAMPLES)).sum(dim=-2)
-    return torch.fft.rfft(brirs, n=CLIP_SAMPLES)
+    if samples > rate:
+        folds = -(-samples // rate)
+        padded = pad(brirs, (0, folds * rate - samples))
+        brirs = padded.unflatten(-1, (folds, rate)).sum(dim=-2)
+    return torch.fft.rfft(brirs, n=rate)
 
 
-def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32]) -> None:
+def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32], rate: int = RATE) -> None:
     """Write a clip as a stereo WAV file of 16 bits, whole or not at all.
 
     Parameters
@@ -206,6 +213,8 @@ def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32]) -> None:
     clip : array or tensor, shape (2, n)
         Left and right ear. Samples are multiplied by 0.1, the same for every clip, so that levels
         compare by ear; what is still beyond full scale is clipped.
+    rate : int
+        Sampling rate in Hz.
 
     Raises
     ------
@@ -217,22 +226,29 @@ def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32]) -> None:
     scaled = np.clip(EXPORT_FACTOR * samples.T, -1.0, 1.0)
     try:
         with atomic_write(target) as part:
-            soundfile.write(part, scaled, RATE, format="WAV", subtype="PCM_16")
+            soundfile.write(part, scaled, rate, format="WAV", subtype="PCM_16")
     except (OSError, soundfile.SoundFileError) as error:
         reason = getattr(error, "strerror", None) or error
         raise UserError(f"{target} cannot be written ({reason}); choose another place") from None
 
 
-def _prepare(samples: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def fade_samples(rate: int) -> int:
+    """Samples over which one second passes into the next."""
+    return round(FADE_SECONDS * rate)
+
+
+def _prepare(
+    samples: NDArray[np.float32], rate: int
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Loop a sound far enough for any cut, and list where a second may begin.
 
     Returns the scaled wave, longer by a second and a fade, and the places (P,) within it.
     """
     wave = np.asarray(samples, dtype=np.float64)
-    looped = np.resize(wave, len(wave) + CLIP_SAMPLES + FADE_SAMPLES)
+    looped = np.resize(wave, len(wave) + rate + fade_samples(rate))
     energy = np.concatenate([[0.0], np.cumsum(looped**2)])
-    starts = np.arange(0, len(wave), HOP)
-    power = (energy[starts + CLIP_SAMPLES] - energy[starts]) / CLIP_SAMPLES
+    starts = np.arange(0, len(wave), round(HOP_SECONDS * rate))
+    power = (energy[starts + rate] - energy[starts]) / rate
     # The usual power is a mean weighted by the power itself: pauses do not count, and the
     # loudest second is never below it.
     usual = (power**2).sum() / power.sum()

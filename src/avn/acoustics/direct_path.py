@@ -25,7 +25,7 @@ from avn.acoustics.materials import BANDS, SPEED_OF_SOUND
 from avn.acoustics.rendering import to_int16
 from avn.core.errors import UserError
 
-LOSS_TAPS = 128
+LOSS_SECONDS = 0.008
 REGIMES = ("transmission", "diffraction")
 
 
@@ -78,7 +78,7 @@ def band_energies(paths: Paths) -> NDArray[np.float64]:
 
 
 def render_paths(
-    paths: Paths, filters: NDArray[np.float32], rate: int, loss_taps: int = LOSS_TAPS
+    paths: Paths, filters: NDArray[np.float32], rate: int, loss_taps: int
 ) -> DirectPaths:
     """Render ways to the ears.
 

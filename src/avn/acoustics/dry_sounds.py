@@ -1,6 +1,7 @@
 """Dry sounds: recordings that sources emit, read from the package or from any audio file.
 
-Every sound becomes mono, 16 kHz, free of offset and of unit RMS, and loops without end.
+Every sound becomes mono, of one sampling rate, free of offset and of unit RMS, and loops without
+end.
 """
 
 import hashlib
@@ -18,16 +19,16 @@ from scipy.signal import resample_poly
 from avn.acoustics.audio_files import missing_part
 from avn.core.errors import UserError
 
-RATE = 16000
+RATE = 16000  # the default
 BUILTIN = ("ring", "alarm", "clock")
 
 SHORTEST_SECONDS = 0.01
 RATES = (1000, 768000)
 SILENCE = 1e-5  # RMS, -100 dB of full scale
-LEAST_KEPT = 0.01  # of the RMS that has to lie below 8 kHz: -40 dB
+LEAST_KEPT = 0.01  # of the RMS that has to lie below half the sampling rate: -40 dB
 
 
-def read_sound(path: str | Path) -> NDArray[np.float32]:
+def read_sound(path: str | Path, rate: int = RATE) -> NDArray[np.float32]:
     """Read any audio file as a dry sound.
 
     Parameters
@@ -36,42 +37,48 @@ def read_sound(path: str | Path) -> NDArray[np.float32]:
         A file that libsndfile reads (WAV, FLAC, OGG, MP3, AIFF, ...), of any sampling rate and any
         number of channels, or one of ``BUILTIN``. ``~`` is the home directory. The name of a
         built-in sound wins over a file of the same name.
+    rate : int
+        Sampling rate wanted, in Hz.
 
     Returns
     -------
     float32 array, shape (n,)
-        The mean of the channels at 16 kHz, of mean 0 and RMS 1. A recording shorter than a second
-        is repeated as often as it takes to fill one, so n >= 16000 and the sound loops.
+        The mean of the channels at that rate, of mean 0 and RMS 1. A recording shorter than a
+        second is repeated as often as it takes to fill one, so n >= rate and the sound loops.
 
     Raises
     ------
     UserError
         The file is missing, a folder, empty, not audio, truncated, shorter than 10 ms, silent (as
-        a whole, once its channels are mixed, or below 8 kHz), or has samples that are not numbers.
+        a whole, once its channels are mixed, or below half the rate), or has samples that are no
+        numbers.
     """
     content = _content(str(path))
-    samples, rate = _decode(content, str(path))
+    samples, own_rate = _decode(content, str(path))
     mixed = samples.mean(axis=1)
     mixed -= mixed.mean()
     loudness = _rms(mixed)
     if loudness < SILENCE:
         raise _error(path, "is silent once mixed to one channel", "take a recording that sounds")
-    common = gcd(RATE, rate)
-    heard = resample_poly(mixed, RATE // common, rate // common)
+    common = gcd(rate, own_rate)
+    heard = resample_poly(mixed, rate // common, own_rate // common)
     heard -= heard.mean()
     if _rms(heard) < LEAST_KEPT * loudness:
-        raise _error(path, "is silent below 8 kHz", "take one that the 16 kHz microphones can hear")
+        wrong = f"is silent below {rate / 2000:g} kHz"
+        raise _error(path, wrong, f"take one that microphones of {rate / 1000:g} kHz can hear")
     heard /= _rms(heard)
-    return np.tile(heard, -(-RATE // len(heard))).astype(np.float32)
+    return np.tile(heard, -(-rate // len(heard))).astype(np.float32)
 
 
-def load_sounds(mapping: Mapping[str, str]) -> dict[str, NDArray[np.float32]]:
+def load_sounds(mapping: Mapping[str, str], rate: int = RATE) -> dict[str, NDArray[np.float32]]:
     """Read the sounds of the config node `sound`.
 
     Parameters
     ----------
     mapping : mapping
         Name of the sound to the name of a built-in sound or the path of a file.
+    rate : int
+        Sampling rate wanted, in Hz.
 
     Returns
     -------
@@ -84,7 +91,7 @@ def load_sounds(mapping: Mapping[str, str]) -> dict[str, NDArray[np.float32]]:
         As `read_sound`, or the mapping is empty.
     """
     _require_sounds(mapping)
-    return {name: read_sound(path) for name, path in mapping.items()}
+    return {name: read_sound(path, rate) for name, path in mapping.items()}
 
 
 def content_hash(mapping: Mapping[str, str]) -> dict[str, str]:

@@ -19,6 +19,9 @@ from avn.acoustics.ambisonics import CHANNELS, DEGREES, rotation_to_heading, sh
 
 HEADINGS = 4
 
+# The level of a head is set at this sampling rate, for all rates alike.
+LEVEL_RATE = 16000
+
 
 @dataclass(frozen=True)
 class ShHrirs:
@@ -53,24 +56,28 @@ class ShHrirs:
 
         Notes
         -----
-        Level: one constant scales all of it, so that a plane wave of unit amplitude from the front
-        arrives with unit energy, averaged over the two ears: the squares of the taps sum to 1,
-        which makes the mean of |H|^2 from 0 Hz to half the sampling rate 1. So a binaural response
-        has the level that an omnidirectional microphone would pick up in front.
+        Level: one constant, the same for every rate, scales all of it, so that a plane wave of
+        unit amplitude from the front arrives with unit energy at 16 kHz, averaged over the two
+        ears: the mean of |H|^2 from 0 Hz to 8 kHz is 1. So a binaural response has the level that
+        an omnidirectional microphone would pick up in front.
         """
-        common = gcd(rate, self.rate)
-        up, down = rate // common, self.rate // common
-        # `resample_poly` keeps the height of an impulse response, while its spectrum has to stay:
-        # the sum over `down / up` times as few taps needs as much more height.
-        left = resample_poly(self.left, up, down, axis=1) * (down / up)
-        ears = np.stack([left, np.where(DEGREES[:, None] < 0, -left, left)])
-        front = np.einsum("ect,c->et", ears, sh([0.0, 1.0, 0.0]))
+        ears = self._resampled(rate)
+        front = np.einsum("ect,c->et", self._resampled(LEVEL_RATE), sh([0.0, 1.0, 0.0]))
         ears /= np.sqrt((front**2).sum(axis=1).mean())
         turned = [
             np.einsum("edt,dc->ect", ears, rotation_to_heading(heading))
             for heading in range(HEADINGS)
         ]
         return np.stack(turned).astype(np.float32)
+
+    def _resampled(self, rate: int) -> NDArray[np.float64]:
+        """Responses of the left and the right ear at a sampling rate, (2, 16, taps)."""
+        common = gcd(rate, self.rate)
+        up, down = rate // common, self.rate // common
+        # `resample_poly` keeps the height of an impulse response, while its spectrum has to stay:
+        # the sum over `down / up` times as few taps needs as much more height.
+        left = resample_poly(self.left, up, down, axis=1) * (down / up)
+        return np.stack([left, np.where(DEGREES[:, None] < 0, -left, left)])
 
 
 @lru_cache(maxsize=1)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from avn.acoustics.ambisonics import CHANNELS, sh
-from avn.acoustics.band_filters import HALF, band_firs
+from avn.acoustics.band_filters import band_firs, half_length
 from avn.acoustics.materials import SPEED_OF_SOUND
 from avn.acoustics.tracer import Events
 
@@ -22,7 +22,7 @@ _TOGETHER = 8  # listeners whose spectra are worked on at once; keeps them in th
 
 @njit(cache=True, fastmath=True)
 def _scatter(place, amplitudes, harmonics, firs, out) -> None:  # type: ignore[no-untyped-def]
-    """Add the events of one listener to `out` (channels, samples), which leads by HALF.
+    """Add the events of one listener to `out` (channels, samples), which leads by `half_length`.
 
     Slices of rows and a sum over the six bands that is written out make the compiler use vector
     instructions: more than twice as fast as plain indices.
@@ -71,26 +71,39 @@ def _filter_and_sum(spectra, filters, out) -> None:  # type: ignore[no-untyped-d
 class Binaural:
     """Filters of the heads in the frequency domain, for responses of one length.
 
-    `spectra` (8, 16, bins): heading x ear, channel; `size` is the length of the transform.
+    `spectra` (8, 16, bins): heading x ear, channel; `size` is the length of the transform, `lead`
+    the samples before time 0.
     """
 
     spectra: NDArray[np.complex64]
     size: int
     samples: int
+    lead: int
 
     @classmethod
-    def prepare(cls, filters: NDArray[np.float32], samples: int) -> "Binaural":
-        """Transform `hrtf.ShHrirs.filters()` for responses of `samples` samples."""
+    def prepare(cls, filters: NDArray[np.float32], samples: int, rate: int) -> "Binaural":
+        """Transform the filters of heads for responses of one length.
+
+        Parameters
+        ----------
+        filters : (4, 2, 16, taps) float32
+            Of `avn.acoustics.hrtf`.
+        samples : int
+            Length of the responses.
+        rate : int
+            Sampling rate in Hz.
+        """
         # What runs past the end wraps round to before the beginning, where it is dropped.
-        size = int(fft.next_fast_len(samples + HALF + filters.shape[-1], real=True))
+        lead = half_length(rate)
+        size = int(fft.next_fast_len(samples + lead + filters.shape[-1], real=True))
         flat = filters.reshape(-1, *filters.shape[2:]).astype(np.float32)
-        return cls(fft.rfft(flat, size, axis=-1).astype(np.complex64), size, samples)
+        return cls(fft.rfft(flat, size, axis=-1).astype(np.complex64), size, samples, lead)
 
 
 def ambisonic_responses(events: Events, first: int, last: int, size: int, rate: int) -> NDArray:
     """Ambisonic impulse responses of listeners `first` to `last`, shape (n, 16, size), float32.
 
-    Sample HALF is time 0, so that the symmetric filters of the bands have room before it.
+    Sample `half_length` is time 0, so that the symmetric filters of the bands have room before it.
     """
     firs = band_firs(rate)
     out = np.zeros((last - first, CHANNELS, size + firs.shape[1]), dtype=np.float32)
@@ -127,7 +140,8 @@ def binaural_responses(
         spectra = fft.rfft(field, axis=-1)
         ears = np.empty((last - first, outputs, spectra.shape[2]), dtype=np.complex64)
         _filter_and_sum(spectra, binaural.spectra, ears)
-        heard = fft.irfft(ears, binaural.size, axis=-1)[..., HALF : HALF + binaural.samples]
+        first_sample, last_sample = binaural.lead, binaural.lead + binaural.samples
+        heard = fft.irfft(ears, binaural.size, axis=-1)[..., first_sample:last_sample]
         result[first:last], scale[first:last] = to_int16(heard)
     return result.reshape(people, 4, 2, binaural.samples), scale
 

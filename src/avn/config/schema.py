@@ -209,10 +209,13 @@ BASES: dict[str, type] = {
 }
 # Parameters that the pipeline gives, and no config.
 GIVEN = {
+    "sound_model": ("rate",),
+    "stop_model": ("rate",),
     "occupancy_model": ("camera",),
     "planner": ("mapper", "oracle_inputs", "stop_at"),
     "baseline": ("network", "hears", "maps", "map_size"),
     # of the part of a network that has this key
+    "spectrogram": ("rate",),
     "net": ("channels", "height", "width", "outputs", "camera"),
 }
 # Parameters that follow the setting of the same name, unless they are given.

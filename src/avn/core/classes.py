@@ -90,7 +90,7 @@ def build_object(option: str, node: DictConfig, **given: Any) -> Any:
     node : DictConfig
         With `_target_`.
     **given
-        Arguments that are in no config.
+        Arguments that are in no config; those that the class does not take are left out.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def build_object(option: str, node: DictConfig, **given: Any) -> Any:
     cls = import_class(f"{option}._target_", target)
     taken = parameters(cls)
     settings = {key: _value(node[key], taken[key][0]) for key in map(str, node) if key in taken}
-    return cls(**(settings | given))
+    return cls(**settings, **{key: value for key, value in given.items() if key in taken})
 
 
 def _value(value: Any, hint: Any) -> Any:

@@ -112,7 +112,7 @@ class ClipSet(Dataset[ClipBatch]):
         realisation, pair = pair // self.pairs, pair % self.pairs
         # A pair that is heard with several sounds is transformed once.
         pair, index = pair.unique(return_inverse=True)
-        spectra = brir_spectra(self._brirs(pair))
+        spectra = brir_spectra(self._brirs(pair), self.sounds.rate)
         source, state = self.source[pair][index], self.state[pair][index]
         return ClipBatch(
             clips=self.renderer.render(spectra, ClipId(source, state, sound, realisation), index),
@@ -247,7 +247,7 @@ class SoundData(L.LightningDataModule):
             raise UserError(f"{self.node}.batch and {self.node}.validation_clips must be 1 or more")
         self.scenes = {"validation": list(validation), "training": list(train)}
         self.sounds, self.recipe = sounds, recipe
-        self.spectrogram: Spectrogram = build_part(recipe.spectrogram, self.node)
+        self.spectrogram: Spectrogram = build_part(recipe.spectrogram, self.node, rate=sounds.rate)
         # Threads that render; the network learns in others.
         self.threads = 1
         seed = recipe.train_seed

@@ -70,6 +70,8 @@ class AudioNetwork(Network):
         Sounds in which each pair of source and state is heard in an epoch; read by the data module.
     validation_clips : int
         Most clips of each set of apartments on which it is measured; read by the data module.
+    rate : int
+        Sampling rate of the clips in Hz.
 
     Attributes
     ----------
@@ -95,13 +97,14 @@ class AudioNetwork(Network):
         train_seed: int = 0,
         sounds_per_pair: int = 1,
         validation_clips: int = 2000,
+        rate: int = 16000,
     ) -> None:
         super().__init__()
         optimizer = as_part(optimizer or OptimizerConfig())
         self.save_hyperparameters(ignore=["criterion", "threshold"])
         self.check_recipe()
         self.flip_augmentation, self.flip_tta = flip_augmentation, flip_tta
-        self.spectrogram: Spectrogram = build_part(spectrogram, self.node)
+        self.spectrogram: Spectrogram = build_part(spectrogram, self.node, rate=rate)
         channels, *size = (
             self.spectrogram.channels,
             self.spectrogram.bands,

@@ -22,8 +22,8 @@ class Spectrogram(nn.Module):
     ----------
     rate : int
         Samples a second; a clip is one second long.
-    stft_window : int
-        Samples of the Hann window.
+    stft_window : float
+        Seconds of the Hann window.
     bands, frames : int
         Height and width of the picture. `frames` divides `rate`.
     scale : {"mel", "linear"}
@@ -45,19 +45,20 @@ class Spectrogram(nn.Module):
     def __init__(
         self,
         rate: int = 16000,
-        stft_window: int = 512,
+        stft_window: float = 0.032,
         bands: int = 64,
         frames: int = 64,
         scale: str = "linear",
         interaural: bool = True,
     ) -> None:
         super().__init__()
-        _check(rate, stft_window, bands, frames, scale)
-        self.rate, self.stft_window, self.frames, self.bands = rate, stft_window, frames, bands
+        window = round(stft_window * rate)
+        _check(rate, window, bands, frames, scale)
+        self.rate, self.window, self.frames, self.bands = rate, window, frames, bands
         self.interaural = interaural
         # Made again from the config at every start, so not part of a checkpoint.
-        self.register_buffer("hann", torch.hann_window(stft_window), persistent=False)
-        weights = band_weights(rate, stft_window, bands, scale)
+        self.register_buffer("hann", torch.hann_window(window), persistent=False)
+        weights = band_weights(rate, window, bands, scale)
         self.register_buffer("band_weights", weights, persistent=False)
 
     @property
@@ -105,10 +106,10 @@ class Spectrogram(nn.Module):
         """(N, 2, rate) to (N, 2, frames, window / 2 + 1) complex, of mean square per bin."""
         hop = self.rate // self.frames
         # The clip is circular, so its start follows its end and no edge needs padding.
-        around = torch.cat((clips, clips[..., : self.stft_window]), -1)
-        windows = around.unfold(-1, self.stft_window, hop)[..., : self.frames, :]
+        around = torch.cat((clips, clips[..., : self.window]), -1)
+        windows = around.unfold(-1, self.window, hop)[..., : self.frames, :]
         # The scale makes the sum over bins the mean square of the signal.
-        scale = math.sqrt(2.0 / (self.stft_window * float(self.hann.square().sum())))
+        scale = math.sqrt(2.0 / (self.window * float(self.hann.square().sum())))
         return torch.fft.rfft(windows * (self.hann * scale))
 
     def mirror(self, pictures: Tensor) -> Tensor:
@@ -129,7 +130,7 @@ class Spectrogram(nn.Module):
         return torch.stack((right, left, *coherence), 1)
 
 
-def band_weights(rate: int, stft_window: int, bands: int, scale: str) -> Tensor:
+def band_weights(rate: int, window: int, bands: int, scale: str) -> Tensor:
     """Overlapping triangles that pool the bins of a spectrum into bands.
 
     The mel scale is that of O'Shaughnessy, 2595 log10(1 + f / 700). A triangle narrower than
@@ -139,14 +140,14 @@ def band_weights(rate: int, stft_window: int, bands: int, scale: str) -> Tensor:
     -------
     (window / 2 + 1, bands) float32 tensor
     """
-    bins = torch.linspace(0.0, rate / 2, stft_window // 2 + 1, dtype=torch.float64)
+    bins = torch.linspace(0.0, rate / 2, window // 2 + 1, dtype=torch.float64)
     top = rate / 2
     if scale == "mel":
         mel = torch.linspace(0.0, 2595 * math.log10(1 + top / 700), bands + 2, dtype=torch.float64)
         edges = 700 * (10 ** (mel / 2595) - 1)
     else:
         edges = torch.linspace(0.0, top, bands + 2, dtype=torch.float64)
-    spacing = rate / stft_window
+    spacing = rate / window
     centres = edges[1:-1]
     below = (centres - edges[:-2]).clamp_min(spacing)
     above = (edges[2:] - centres).clamp_min(spacing)
@@ -155,13 +156,15 @@ def band_weights(rate: int, stft_window: int, bands: int, scale: str) -> Tensor:
     return triangle.clamp_min(0.0).float()
 
 
-def _check(rate: int, stft_window: int, bands: int, frames: int, scale: str) -> None:
+def _check(rate: int, window: int, bands: int, frames: int, scale: str) -> None:
     where = "spectrogram"
     if scale not in ("mel", "linear"):
         raise UserError(f"{where}.scale is '{scale}'; give mel or linear")
-    if not 2 <= stft_window <= rate:
-        raise UserError(f"{where}.stft_window is {stft_window}; give 2 to {rate} samples")
+    if not 2 <= window <= rate:
+        raise UserError(f"{where}.stft_window is {window / rate:g}; give {2 / rate:g} to 1 second")
     if frames < 1 or rate % frames:
         raise UserError(f"{where}.frames is {frames}; give a divisor of {rate}, such as 64")
-    if not 1 <= bands <= stft_window // 2:
-        raise UserError(f"{where}.bands is {bands}; give 1 to {stft_window // 2}, half the window")
+    if not 1 <= bands <= window // 2:
+        raise UserError(
+            f"{where}.bands is {bands}; give 1 to {window // 2}, half the samples of the window"
+        )

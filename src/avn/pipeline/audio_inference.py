@@ -29,7 +29,7 @@ from avn.pipeline.apartments import Apartments
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
-from avn.pipeline.trained import Fitted
+from avn.pipeline.trained_on_clips import TrainedOnClips
 
 # Clips rendered at once; more would leave the caches of a CPU.
 BATCH = 96
@@ -73,7 +73,7 @@ class AudioInference(ApartmentTensors):
 
     @property
     @abstractmethod
-    def network(self) -> Fitted:
+    def network(self) -> TrainedOnClips:
         """The stage of the network that listens."""
 
     def answer(self, model: Any) -> Callable[[Tensor], Tensor]:
@@ -112,7 +112,13 @@ class AudioInference(ApartmentTensors):
         return 4 * self.apartments.pairs * sounds * self.realisations / CLIPS_PER_SECOND
 
     def check(self) -> None:
-        """Refuse a number of takes that cannot be."""
+        """Refuse a number of realisations that cannot be, and clips of another sampling rate."""
+        rate, known = self.apartments.node("acoustics").rate, self.network.rate
+        if rate != known:
+            raise UserError(
+                f"{self.apartments.world.acoustics}.rate: {rate}, and the {self.network.kind} is "
+                f"trained at {known} Hz; give training.acoustics.rate the same"
+            )
         if not 1 <= self.realisations <= MOST_REALISATIONS:
             raise UserError(
                 f"{self.clips.realisations}: {self.realisations} is out of range; give 1 to "
@@ -194,7 +200,7 @@ def hear(
     @torch.inference_mode()
     def listen(rows: Tensor) -> Tensor:
         # Whole pairs, so that an impulse response is transformed once for all its clips.
-        spectra = brir_spectra(brirs.gather(source[rows], state[rows]))
+        spectra = brir_spectra(brirs.gather(source[rows], state[rows]), sounds.rate)
         index = torch.arange(len(rows)).repeat_interleave(each)
         repeated = sound.repeat(len(rows)), realisation.repeat(len(rows))
         clip = ClipId(source[rows][index], state[rows][index], *repeated)

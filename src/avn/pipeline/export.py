@@ -110,13 +110,13 @@ def _export(cfg: DictConfig, chosen: list[AudibleScene]) -> None:
         pairs = [tuple(pair) for pair in cfg.clips] or _near_and_far(which)
         _check_pairs(which, pairs)
         source, state = (torch.tensor(column) for column in zip(*pairs, strict=True))
-        spectra = brir_spectra(which.brirs.gather(source, state))
+        spectra = brir_spectra(which.brirs.gather(source, state), sounds.rate)
         for index, name in enumerate(sounds.names):
             sound = torch.full_like(source, index)
             clips = render.render(spectra, ClipId(source, state, sound, torch.zeros_like(source)))
             for (k, s), clip in zip(pairs, clips, strict=True):
                 file = f"{name}-{cfg.acoustics.name}-source{k}-state{s}.wav"
-                export_wav(which.folder / "wav" / file, clip)
+                export_wav(which.folder / "wav" / file, clip, sounds.rate)
         log(f"{which.name}: {len(pairs) * len(sounds)} clips in {which.folder / 'wav'}")
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from omegaconf import DictConfig
 from torch import Tensor
 
-from avn.acoustics.clips import CLIP_SAMPLES, FADE_SAMPLES, ClipRenderer, brir_spectra
+from avn.acoustics.clips import ClipRenderer, brir_spectra, fade_samples
 from avn.core.classes import build_object
 from avn.core.clip_id import ClipId
 from avn.navigation.trace import Trace
@@ -60,7 +60,7 @@ class Perceived:
         return np.stack([self._views[room][int(state)] for state in states])
 
     def clips(self, trace: Trace) -> Tensor:
-        """What is heard at each step, (T + 1, 2, 16000) float32, left and right ear."""
+        """What is heard at each step, (T + 1, 2, rate) float32, left and right ear."""
         brirs = self._scenes[trace.place.name].brirs
         state, realisation = torch.from_numpy(trace.state), torch.from_numpy(trace.realisation)
         parts = []
@@ -69,7 +69,7 @@ class Perceived:
         ):
             source = torch.full_like(states, trace.source)
             sound = torch.full_like(states, trace.sound)
-            spectra = brir_spectra(brirs.gather(source, states))
+            spectra = brir_spectra(brirs.gather(source, states), self._renderer.sounds.rate)
             parts.append(
                 self._renderer.render(spectra, ClipId(source, states, sound, realisations))
             )
@@ -83,18 +83,20 @@ def soundtrack(clips: Tensor) -> NDArray[np.float32]:
 
     Parameters
     ----------
-    clips : (T, 2, 16000) float32 tensor
+    clips : (T, 2, rate) float32 tensor
 
     Returns
     -------
-    (16000 T, 2) float32
+    (rate T, 2) float32
         Left and right; one factor for all brings the peak to 0.9, so that it grows louder on the
         way to the source.
     """
     sound = clips.clone()
-    rise = (torch.arange(FADE_SAMPLES) + 1) / (FADE_SAMPLES + 1)
-    begun = clips[1:, :, :FADE_SAMPLES] * rise
-    sound[1:, :, :FADE_SAMPLES] = begun + clips[:-1, :, :FADE_SAMPLES] * (1 - rise)
-    track = sound.permute(0, 2, 1).reshape(len(clips) * CLIP_SAMPLES, 2)
+    rate = clips.shape[-1]
+    fade = fade_samples(rate)
+    rise = (torch.arange(fade) + 1) / (fade + 1)
+    begun = clips[1:, :, :fade] * rise
+    sound[1:, :, :fade] = begun + clips[:-1, :, :fade] * (1 - rise)
+    track = sound.permute(0, 2, 1).reshape(len(clips) * rate, 2)
     scaled: NDArray[np.float32] = (track * (0.9 / track.abs().max().clamp_min(1e-9))).numpy()
     return scaled

@@ -195,7 +195,8 @@ class _Media:
         for label, key, trace in zip(labels, keys, traces, strict=True):
             assert perceived is not None
             place = self._key(trace)
-            own = page_media.episode_media(trace, soundtrack(perceived.clips(trace)))
+            clips = perceived.clips(trace)
+            own = page_media.episode_media(trace, soundtrack(clips), clips.shape[-1])
             own |= {"run": index, "plan": self._plan(trace)}
             renderer = (place, str(run.cfg.renderer.name))
             own["views"] = [self._view(perceived, trace, *renderer, int(s)) for s in trace.state]

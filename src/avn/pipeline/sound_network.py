@@ -37,7 +37,7 @@ class SoundNetwork(TrainedOnClips):
     def untrained(self) -> SoundCnn:
         """The network before training."""
         torch.manual_seed(self.cfg.sound_model.train_seed)
-        model: SoundCnn = build_object("sound_model", self.cfg.sound_model)
+        model: SoundCnn = build_object("sound_model", self.cfg.sound_model, rate=self.rate)
         return model
 
     def data(self) -> SoundData:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
 from avn.acoustics.clips import DrySounds
 from avn.acoustics.dry_sounds import content_hash, load_sounds
@@ -33,7 +33,8 @@ def sound_files(cfg: DictConfig, world: World = TEST) -> dict[str, str]:
 
 def dry_sounds(cfg: DictConfig, world: World = TEST) -> DrySounds:
     """The recordings of a world; raises `UserError` where one cannot be read."""
-    return DrySounds(load_sounds(sound_files(cfg, world)))
+    rate = int(OmegaConf.select(cfg, world.acoustics).rate)
+    return DrySounds(load_sounds(sound_files(cfg, world), rate), rate=rate)
 
 
 def sounds_content(cfg: DictConfig, world: World = TEST) -> list[Any]:

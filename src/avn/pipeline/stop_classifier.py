@@ -56,7 +56,7 @@ class StopNetwork(TrainedOnClips):
 
     def untrained(self) -> StopClassifier:
         """The network before training."""
-        model: StopClassifier = build_object("stop_model", self.cfg.stop_model)
+        model: StopClassifier = build_object("stop_model", self.cfg.stop_model, rate=self.rate)
         return model
 
     def data(self) -> StopData:

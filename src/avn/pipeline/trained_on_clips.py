@@ -34,6 +34,11 @@ class TrainedOnClips(Fitted):
             raise UserError(self.without)
         super().check()
 
+    @property
+    def rate(self) -> int:
+        """The sampling rate of its clips, Hz."""
+        return int(self.train.node("acoustics").rate)
+
     def needs(self) -> Sequence[DirectSound]:
         """The sound of the training and validation apartments."""
         return (DirectSound(self.cfg, self.train), DirectSound(self.cfg, self.validation))

@@ -18,7 +18,6 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 from torch import Tensor
 
-from avn.acoustics.dry_sounds import RATE
 from avn.core.actions import HEADINGS
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
@@ -51,9 +50,9 @@ def write_film(
     name : str
         Of the run.
     views : (T + 1, H, W, 3) uint8
-    clips : (T + 1, 2, 16000) float32 tensor
+    clips : (T + 1, 2, rate) float32 tensor
         What is heard at each step, for the spectrogram.
-    track : (16000 (T + 1), 2) float32
+    track : (rate (T + 1), 2) float32
         The same as the film's sound; see `avn.pipeline.observed.soundtrack`.
 
     Raises
@@ -63,7 +62,7 @@ def write_film(
     """
     with atomic_write(path) as part, tempfile.TemporaryDirectory() as folder:
         wave = Path(folder) / "sound.wav"
-        soundfile.write(wave, track, RATE, subtype="PCM_16")
+        soundfile.write(wave, track, clips.shape[-1], subtype="PCM_16")
         writer = imageio_ffmpeg.write_frames(
             str(part),
             SIZE,

@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from avn.acoustics.dry_sounds import RATE
 from avn.apartments.floor_plan import CELL
 from avn.core.actions import HEADINGS
 from avn.navigation.place import Place
@@ -61,16 +60,16 @@ def view_url(view: NDArray[np.uint8]) -> str:
     return data_url("image/jpeg", buffer.getvalue())
 
 
-def sound_url(track: NDArray[np.float32]) -> str:
-    """A track (n, 2) at 16 kHz as Ogg Vorbis."""
+def sound_url(track: NDArray[np.float32], rate: int) -> str:
+    """A track (n, 2) of a sampling rate in Hz as Ogg Vorbis."""
     buffer = io.BytesIO()
-    with soundfile.SoundFile(buffer, "w", RATE, 2, format="OGG", subtype="VORBIS") as file:
-        for start in range(0, len(track), RATE):  # libsndfile crashes on minutes at once
-            file.write(track[start : start + RATE])
+    with soundfile.SoundFile(buffer, "w", rate, 2, format="OGG", subtype="VORBIS") as file:
+        for start in range(0, len(track), rate):  # libsndfile crashes on minutes at once
+            file.write(track[start : start + rate])
     return data_url("audio/ogg", buffer.getvalue())
 
 
-def episode_media(trace: Trace, track: NDArray[np.float32]) -> dict[str, Any]:
+def episode_media(trace: Trace, track: NDArray[np.float32], rate: int) -> dict[str, Any]:
     """What a page shows of an episode step by step, beside its views."""
     heading = (trace.state % HEADINGS)[:, None]
     return {
@@ -83,7 +82,7 @@ def episode_media(trace: Trace, track: NDArray[np.float32]) -> dict[str, Any]:
         "heard": None if trace.heard is None else _rounded(trace.heard),
         "belief": _belief(trace),
         "memory": _memory(trace),
-        "sound": sound_url(track),
+        "sound": sound_url(track, rate),
     }
 
 
