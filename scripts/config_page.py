@@ -16,19 +16,21 @@ from config_readers import Readers, find_readers
 PAGE = Path(__file__).parents[1] / "docs" / "config.md"
 HEAD = """# Config keys
 
-`python scripts/config_page.py` writes this page from composed configs. A key is set on the command
-line of any command that reads it: `python -m avn.eval agent=greedy protocol.num_starts=5`. A group is
-set to one of its options: `protocol=stop`. `_target_` in a node names the class that is built of
-it.
+This page is generated from composed configs by `python scripts/config_page.py`.
 
-A key with several defaults has the first one, except in the options that are named. "Read by" names
-the stages of `src/avn/pipeline/` that read the key ([Stages](architecture.md#stages)), for all rows
-and all models together; a dash stands for a key that enters no product. A product is made anew
-where a key that its stage reads has changed.
+A key can be set on the command line of each command that reads it:
+`python -m avn.eval agent=greedy protocol.num_starts=5`. A group is set to one of its options:
+`protocol=stop`. The key `_target_` of a node names the class that the node configures.
+
+Where the column "default" lists several values, a value followed by "in" is the default of the
+options that follow; the other value is the default of all remaining options. "Read by" lists the
+stages of `src/avn/pipeline/` that read the key, over all rows and all models
+([Stages](architecture.md#stages)). A dash means that the key affects no product.
+A product is built again when a key that its stage reads has changed.
 """
 ADVICE = (
-    "describe it in the docstring of its class (`Attributes` or `Parameters`), or by a comment "
-    "beside it in conf/"
+    "describe it in the docstring of its class (`Attributes` or `Parameters`), or in a comment "
+    "next to it in conf/"
 )
 
 
@@ -44,7 +46,7 @@ def page(found: list[Group], readers: Readers) -> str:
     for group in found:
         parts.append(f"## {group.name}\n")
         if group.options:
-            parts += ["| option | what it is |", "| --- | --- |"]
+            parts += ["| option | description |", "| --- | --- |"]
             parts += [f"| `{name}` | {_cell(text)} |" for name, text in group.options.items()]
             parts.append("")
         parts += [*_table(group, readers), ""]

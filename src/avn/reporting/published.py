@@ -83,8 +83,8 @@ def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
 def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str] = ()) -> str:
     """A table for each sound: agents down, rooms across, what belongs to a cell under it."""
     text = [
-        f"Success rate / SPL in % ({_settings(cells)}); under them the 95 % interval, the "
-        "standard deviation over seeds, and in brackets the paper's.",
+        f"Success rate / SPL in % ({_settings(cells)}). Below each pair: the 95 % interval, the "
+        "standard deviation over seeds and, in parentheses, the results of the paper.",
         "",
     ]
     for sound, part in _by_sound(cells, sounds):
