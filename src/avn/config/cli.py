@@ -88,24 +88,20 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
         return task(cfg)
 
     job.__module__ = name
-    is_sweep = False
+    sweeps.begin()  # of one job or of many: an experiment may be a sweep by itself
     try:
         sys.argv = [sys.argv[0], *arrange(option_files.take_folders(sys.argv[1:]))]
-        is_sweep = "--multirun" in sys.argv
-        if is_sweep:
-            sweeps.begin()
         _compose_and_do(config_name, job)
         if errors:
             return _report(name, errors[0], explain(errors[0]))
-        return sweeps.end(name) if is_sweep else 0
+        return sweeps.end(name)
     except KeyboardInterrupt:
         print(f"{name}: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
         return _report(name, error, explain(error, composed=False))
     finally:
-        if is_sweep:
-            sweeps.forget()
+        sweeps.forget()
 
 
 def _compose_and_do(config_name: str, job: Callable[[DictConfig], None]) -> None:

@@ -10,7 +10,7 @@ from avn.config.spare import compose_fitting
 from avn.core.errors import UserError
 
 # Overrides that belong to this command and not to a row.
-_OWN = ("rows", "seeds", "train_seeds", "sounds")
+_OWN = ("rows", "seeds", "train_seeds", "sounds", "experiment")
 
 
 def compose_row(cfg: DictConfig, row: str) -> DictConfig:

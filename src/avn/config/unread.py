@@ -15,7 +15,7 @@ from avn.core.errors import UserError
 from avn.core.settings import leaves, plain
 
 # Groups that choose what a command does; the defaults of their options are no one's mistake.
-_CHOOSE = ("agent", "model")
+_CHOOSE = ("agent", "model", "experiment")
 
 
 def refuse_unread(command: str, cfg: DictConfig, read: Collection[str]) -> None:
