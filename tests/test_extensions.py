@@ -1,6 +1,7 @@
 """Parts from outside the package: one importable file and one config file each, nothing else."""
 
 import json
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -10,6 +11,7 @@ import yaml
 from small import A3C, EYES, SMALL, fitting
 
 from avn.acoustics.microphone import Microphone
+from avn.config.cli import command
 from avn.config.saved import read_config
 from avn.pipeline.run import Evaluation
 
@@ -163,6 +165,13 @@ class Clipping(Microphone):
 '''
 OPTIONS = {
     "sound_model/deep": {"_target_": "own_parts.DeepSound", "name": "deep"},
+    # on top of an option of ours, whose class has not these settings
+    "sound_model/deeper": {
+        "defaults": ["released", "_self_"],
+        "_target_": "own_parts.DeepSound",
+        "name": "deeper",
+        "layers": 4,
+    },
     "occupancy_model/patient": {"_target_": "own_parts.PatientSight", "name": "patient"},
     "mapper/forgetful": {"_target_": "own_parts.ForgetfulMapper", "name": "forgetful"},
     "planner/lazy": {"_target_": "own_parts.LazyPlanner", "name": "lazy"},
@@ -221,6 +230,16 @@ def test_a_sound_network_with_settings_of_its_own_feeds_an_actor_critic(run):
     assert Evaluation(cfg).folder == run_folder  # and pictures of the run find it again
     cards = [path.read_text() for path in folder.parent.glob("sound_cnn-*/model_card.md")]
     assert any("layers: 3" in card for card in cards)
+
+
+def test_an_option_on_top_of_one_of_ours_keeps_its_settings(own, monkeypatch, capfd):
+    monkeypatch.syspath_prepend(own)
+    given = ("--config-dir", str(own / "conf"), "model=sound_cnn", "sound_model=deeper")
+    monkeypatch.setattr(sys, "argv", ["avn.train", *given, "--cfg", "job", "-p", "sound_model"])
+    assert command("train")(lambda cfg: None)() == 0
+    shown = yaml.safe_load(capfd.readouterr().out)
+    assert (shown["layers"], shown["net"]["output_scale"], shown["epochs"]) == (4, 10.0, 30)
+    assert shown["optimizer"]["_target_"] == "torch.optim.Adadelta"
 
 
 def test_an_occupancy_network(run):

@@ -229,8 +229,18 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
             return _one_line(f"{link.filename}: {link.strerror}")
     if not composed or isinstance(error, USER_MISTAKES):
         first, *causes = dict.fromkeys(_one_line(str(link)) for link in chain if str(link))
-        return "; ".join([first, *(cause for cause in causes[:1] if cause not in first)])
+        known = [_known(link) for link in chain if _known(link)][:1]
+        return "; ".join([first, *(cause for cause in causes[:1] if cause not in first), *known])
     return None
+
+
+def _known(error: BaseException) -> str:
+    """The keys that there are, where an error is about one that is not."""
+    schema = getattr(error, "object_type", None)
+    if " not in '" not in str(error) or not dataclasses.is_dataclass(schema):
+        return ""
+    names = [field.name for field in dataclasses.fields(schema) if field.name != "_target_"]
+    return f"there are {', '.join(names)}"
 
 
 def _one_line(text: str) -> str:

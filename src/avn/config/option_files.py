@@ -6,13 +6,14 @@ A user's folders are named on the command line, `--config-dir FOLDER`.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from hydra._internal.core_plugins.file_config_source import FileConfigSource
 from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.object_type import ObjectType
 from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
-from omegaconf import DictConfig, OmegaConf, open_dict
+from omegaconf import DictConfig, ListConfig, OmegaConf, open_dict
 
 from avn.config.folder import conf_folder, without_folders
 from avn.config.renamed import check_file
@@ -89,6 +90,36 @@ class OptionFilesPath(SearchPathPlugin):
             search_path.prepend("command-line", f"avn://{folder}")
 
 
+def _on_top(group: str, node: DictConfig, defaults: ListConfig) -> tuple[DictConfig, ListConfig]:
+    """An option with a class of its own, on top of the options of its group that it names.
+
+    Hydra would merge the schema of the one class into that of the other. Here the settings are
+    merged first, and the class of the option says which there are.
+    """
+    kept: list[Any] = []
+    below: Any = OmegaConf.create()
+    for default in defaults:
+        if not isinstance(default, str) or default == "_self_":
+            kept.append(default)
+            continue
+        base = _read_option(group, default)
+        kept += [own for own in base.pop("defaults", []) if own != "_self_"]
+        below = OmegaConf.merge(below, base)
+    merged, left = OmegaConf.merge(below, node), OmegaConf.create(kept)
+    assert isinstance(merged, DictConfig)
+    return merged, left
+
+
+def _read_option(group: str, name: str) -> DictConfig:
+    for folder in (*map(Path, _folders), conf_folder()):
+        path = folder / group / f"{name}.yaml"
+        if path.is_file():
+            found = OmegaConf.load(path)
+            assert isinstance(found, DictConfig)
+            return found
+    raise UserError(f"{group}: there is no option '{name}', on which another one stands")
+
+
 def _typed(name: str, node: DictConfig) -> DictConfig:
     """An option with its schema; one that stands on another of its group gets it from that."""
     defaults = node.pop("defaults", None)
@@ -97,6 +128,8 @@ def _typed(name: str, node: DictConfig) -> DictConfig:
             f"{name}: its defaults name a schema, which options need no more; remove it"
         )
     group = name.split("/")[0]
+    if is_option(group, node) and defaults is not None:
+        node, defaults = _on_top(group, node, defaults)
     if is_option(group, node):
         node = with_signature(group, node)
     elif group in SCHEMAS and defaults is None:
