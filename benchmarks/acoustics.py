@@ -1,16 +1,16 @@
 """Time, memory and agreement of the acoustic engine against pyroomacoustics' ray tracing.
 
 Both trace one source of the same furnished apartment, with the same surfaces, absorption and
-scattering: pyroomacoustics with 2,000 rays, this engine with its default. Ours includes all that it
-makes for a pair (reverberation and first arrival, both ears, four headings), theirs stops at the
-energy histogram, before any impulse response. Each runs in a process of its own, which reports its
-processor time and peak memory; theirs grows in proportion to the listeners, so it gets every
-`--every`-th cell.
+scattering: pyroomacoustics with 2,000 rays, this engine with its default. The time of this engine
+includes all that it computes for a pair (reverberation and direct path, both ears, four headings);
+that of pyroomacoustics ends with the energy histogram, before any impulse response. Each runs in a
+process of its own, which reports its processor time and peak memory. The memory of pyroomacoustics
+is proportional to the number of receivers, so it gets every `--every`-th cell.
 
-Agreement is measured with mirrors for walls (scattering 0) too, since pyroomacoustics hands
-scattered energy to listeners twice, once as diffuse rain and once with the ray that goes on: in a
-shoebox of absorption 0.1 its level is 0.0 dB from ours at scattering 0 and 2.7 dB above at 1,
-where ours stays at the level that the balance of energies asks for.
+Agreement is also measured without scattering, since pyroomacoustics gives scattered energy to
+receivers twice, once as diffuse rain and once with the ray that goes on: in a shoebox of absorption
+0.1 its level is 0.0 dB from ours at scattering 0 and 2.7 dB above at 1, where ours agrees with the
+energy balance.
 
 Run from the repository: ``python benchmarks/acoustics.py``.
 """
@@ -43,7 +43,7 @@ SECONDS = 0.6
 
 @dataclass
 class Outcome:
-    """What one engine took and found for L listeners."""
+    """Time, memory and results of one engine for L receivers."""
 
     seconds: float  # of the processor, for a pair
     megabytes: float
@@ -52,51 +52,51 @@ class Outcome:
 
 
 def peak_megabytes() -> float:
-    """The most memory that this process has held."""
+    """Return the peak memory of this process in MB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def place(plan: FloorPlan) -> tuple[Surfaces, NDArray, NDArray, NDArray]:
-    """Surfaces, the first source, all cells' ears, and which of them see the source."""
+def scene_geometry(plan: FloorPlan) -> tuple[Surfaces, NDArray, NDArray, NDArray]:
+    """Return the surfaces, first source, receivers on all cells, and those in line of sight."""
     surfaces, grid = build_surfaces(plan), build_grid(plan)
     source = np.array([*grid.centres[source_cells(plan, grid)[0]], 1.0])
-    ears = np.column_stack([grid.centres, np.full(len(grid.centres), 1.5)])
-    seen = line_of_sight(surfaces, np.broadcast_to(source, ears.shape).copy(), ears)
-    return surfaces, source, ears, seen
+    receivers = np.column_stack([grid.centres, np.full(len(grid.centres), 1.5)])
+    seen = line_of_sight(surfaces, np.broadcast_to(source, receivers.shape).copy(), receivers)
+    return surfaces, source, receivers, seen
 
 
 def decay_times(histograms: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    """T20 of energies (L, bins, 6), mean over 500, 1,000 and 2,000 Hz."""
+    """Compute T20 of energies (L, bins, 6), mean over 500, 1,000 and 2,000 Hz."""
     times = [
-        [reverberation_time(person[:, band], step, -5, -25) for band in (2, 3, 4)]
-        for person in histograms
+        [reverberation_time(histogram[:, band], step, -5, -25) for band in (2, 3, 4)]
+        for histogram in histograms
     ]
     return np.mean(times, axis=1)
 
 
-def run_ours(plan: FloorPlan, every: int, scattered: bool) -> Outcome:
-    """Render all that is made for each pair, then measure on the traced energies."""
-    surfaces, source, ears, seen = place(plan)
+def run_ours(plan: FloorPlan, stride: int, scattered: bool) -> Outcome:
+    """Render the responses of all pairs, then measure on the traced energies."""
+    surfaces, source, receivers, seen = scene_geometry(plan)
     config = AcousticsConfig(seconds=SECONDS, air=False)
-    render_source(surfaces, source, ears[:4], config)  # compiles, or loads what is compiled
+    render_source(surfaces, source, receivers[:4], config)  # compiles, or loads what is compiled
     begin = time.process_time()
-    render_source(surfaces, source, ears, config)
-    render_direct_paths(walls(plan), source, ears, config)
+    render_source(surfaces, source, receivers, config)
+    render_direct_paths(walls(plan), source, receivers, config)
     taken, memory = time.process_time() - begin, peak_megabytes()
-    chosen = ears[::every]
+    subset = receivers[::stride]
     scattering = None if scattered else np.zeros((len(surfaces.materials), 6))
     events = trace(
-        surfaces, source, chosen, rays=40000, seconds=SECONDS, air=False, scattering=scattering
+        surfaces, source, subset, rays=40000, seconds=SECONDS, air=False, scattering=scattering
     )
-    direct = band_energies(find_paths("transmission", walls(plan), source, chosen))
+    direct = band_energies(find_paths("transmission", walls(plan), source, subset))
     histograms = events.histogram(STEP)
-    energy = histograms.sum(axis=1) + direct * seen[::every, None]
+    energy = histograms.sum(axis=1) + direct * seen[::stride, None]
     decays = decay_times(histograms, STEP)
-    return Outcome(taken / len(ears), memory, decays, 10 * np.log10(energy.mean(axis=1)))
+    return Outcome(taken / len(receivers), memory, decays, 10 * np.log10(energy.mean(axis=1)))
 
 
 def in_air(plan: FloorPlan, points: NDArray) -> NDArray[np.bool_]:
-    """Whether points (N, 3) are inside a room or doorway and outside of all furniture."""
+    """Test points (N, 3) for being inside a room or doorway and outside of all furniture."""
     solid = np.zeros(len(points), dtype=bool)
     for block in walls(plan):
         solid |= ((points[:, :2] > block[:2]) & (points[:, :2] < block[2:])).all(axis=1)
@@ -108,10 +108,10 @@ def in_air(plan: FloorPlan, points: NDArray) -> NDArray[np.bool_]:
 
 
 def peer_walls(surfaces: Surfaces, plan: FloorPlan, scattered: bool) -> list:
-    """The same rectangles as pyroomacoustics' walls, with normals that point out of the air."""
+    """Convert surfaces to walls of pyroomacoustics, with normals that point out of the air."""
     absorbed = materials.absorption(surfaces.materials)
     roughness = materials.scattering(surfaces.materials) * scattered
-    found = []
+    reflectors = []
     for quad in range(len(surfaces.axis)):
         axis = int(surfaces.axis[quad])
         u, v = (i for i in range(3) if i != axis)
@@ -125,14 +125,14 @@ def peer_walls(surfaces: Surfaces, plan: FloorPlan, scattered: bool) -> list:
             corners = corners[:, ::-1]
         row = surfaces.material[quad]
         outline = np.ascontiguousarray(corners)
-        found.append(pra.wall_factory(outline, absorbed[row], roughness[row], str(quad)))
-    return found
+        reflectors.append(pra.wall_factory(outline, absorbed[row], roughness[row], str(quad)))
+    return reflectors
 
 
-def run_theirs(plan: FloorPlan, every: int, scattered: bool, rays: int = 2000) -> Outcome:
+def run_theirs(plan: FloorPlan, stride: int, scattered: bool, rays: int = 2000) -> Outcome:
     """Trace with pyroomacoustics; its histograms hold the direct sound."""
-    surfaces, source, ears, _ = place(plan)
-    ears = ears[::every]
+    surfaces, source, receivers, _ = scene_geometry(plan)
+    receivers = receivers[::stride]
     room = pra.Room(
         peer_walls(surfaces, plan, scattered), fs=16000, max_order=0, ray_tracing=True,
         air_absorption=False,
@@ -143,7 +143,7 @@ def run_theirs(plan: FloorPlan, every: int, scattered: bool, rays: int = 2000) -
     )  # fmt: skip
     room.is_inside = lambda *_, **__: True  # its own test fails where boxes stand on a floor
     room.add_source(source)
-    room.add_microphone_array(ears.T)
+    room.add_microphone_array(receivers.T)
     begin = time.process_time()
     room.ray_tracing()
     taken = time.process_time() - begin
@@ -152,20 +152,20 @@ def run_theirs(plan: FloorPlan, every: int, scattered: bool, rays: int = 2000) -
     histograms = np.stack([np.asarray(h[0][0]).T[:bins] for h in room.rt_histograms])
     energy = histograms.sum(axis=1).mean(axis=1) / (4 * np.pi)
     decays = decay_times(histograms, STEP)
-    return Outcome(taken / len(ears), peak_megabytes(), decays, 10 * np.log10(energy))
+    return Outcome(taken / len(receivers), peak_megabytes(), decays, 10 * np.log10(energy))
 
 
 def in_own_process(run: Callable[..., Outcome], *arguments: object, **named: object) -> Outcome:
-    """Run where nothing else has used memory."""
+    """Run in a new process, so that its peak memory can be measured."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(run, arguments, named)
 
 
 def compare(what: str, ours: Outcome, theirs: Outcome, near: NDArray[np.bool_]) -> None:
-    """Print how the engines agree, in the source's room and elsewhere."""
-    for where, chosen in (("source's room", near), ("other rooms", ~near)):
-        decays = [np.nanmean(outcome.decays[chosen]) for outcome in (ours, theirs)]
-        off = (ours.levels - theirs.levels)[chosen]
+    """Print the agreement of the engines, in the source's room and elsewhere."""
+    for where, subset in (("source's room", near), ("other rooms", ~near)):
+        decays = [np.nanmean(outcome.decays[subset]) for outcome in (ours, theirs)]
+        off = (ours.levels - theirs.levels)[subset]
         print(
             f"{what}, {where}: T20 {decays[0]:.2f} s against {decays[1]:.2f} s "
             f"({100 * (decays[0] / decays[1] - 1):+.0f} %), level {off.mean():+.1f} dB "
@@ -180,11 +180,11 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=6, help="one cell in so many for the peer")
     options = parser.parse_args()
     plan = generate(options.seed, "benchmark")
-    surfaces, source, ears, _ = place(plan)
+    surfaces, source, receivers, _ = scene_geometry(plan)
     grid = build_grid(plan)
     rooms = grid.rooms[:: options.every]
-    near = rooms == grid.rooms[np.argmin(np.linalg.norm(ears[:, :2] - source[:2], axis=1))]
-    print(f"apartment: {len(surfaces.axis)} rectangles, {len(ears)} listeners a source")
+    near = rooms == grid.rooms[np.argmin(np.linalg.norm(receivers[:, :2] - source[:2], axis=1))]
+    print(f"apartment: {len(surfaces.axis)} rectangles, {len(receivers)} receivers for each source")
     ours = in_own_process(run_ours, plan, options.every, True)
     theirs = in_own_process(run_theirs, plan, options.every, True)
     for name, outcome in (("avn", ours), ("pyroomacoustics", theirs)):

@@ -1,8 +1,8 @@
-"""Plans a second of the planner against one networkx call an episode and step.
+"""Speed of the planner against networkx, called once for each episode and step.
 
-Both plan on the same partial graphs, those of `ours_noexp` on its way through a hand-drawn flat,
-and must find paths of the same cost. The peer keeps a graph for each episode and brings it up to
-date as the map changes, which is not counted; only its search is. Then whole episodes.
+Both plan on the same partial graphs, those of `ours_noexp` in a hand-drawn flat, and must find
+paths of the same cost. The peer has a graph for each episode; its update is not timed, only its
+search is. Then whole episodes.
 
     python benchmarks/planning.py
 """
@@ -45,12 +45,12 @@ cccccccccccdddddd
 cc##ccccC#ddddddd
 """
 STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
-# Plans of each step that the peer makes too.
+# Number of plans of each step that the peer makes too.
 COMPARED = 4
 
 
 def senses(place: DrawnPlace) -> SceneObservations:
-    """True hearing with an error of a cell or so, and true windows."""
+    """Return source estimates with an error of about a cell, and true windows."""
     lattice = torch.from_numpy(place.grid.lattice).long()
     where = relative_locations(lattice, torch.from_numpy(np.asarray(place.sources)).long())
     generator = torch.Generator().manual_seed(0)
@@ -60,7 +60,7 @@ def senses(place: DrawnPlace) -> SceneObservations:
 
 
 def peer_graph(cost: np.ndarray, walls: np.ndarray, turn: float) -> nx.DiGraph:
-    """The partial graph of one episode for networkx: nodes (column, row, heading)."""
+    """Build the partial graph of one episode for networkx: nodes (column, row, heading)."""
     size, graph = len(cost), nx.DiGraph()
     for x, y, h in np.ndindex(size, size, 4):
         for after in ((h - 1) % 4, (h + 1) % 4):
@@ -73,13 +73,14 @@ def peer_graph(cost: np.ndarray, walls: np.ndarray, turn: float) -> nx.DiGraph:
 
 
 class Timed:
-    """Stands in for the planner's search: times it, and the peer on some of the same plans."""
+    """Wrapper of the planner's search that times it, and the peer on some of the same plans."""
 
     def __init__(self) -> None:
         self.seconds = self.peer_seconds = 0.0
         self.plans = self.peer_plans = 0
 
     def __call__(self, cost, walls, pose, target, aim, turn, back, running, reach):
+        """See `avn.planning.shortest_path.first_actions`."""
         start = time.perf_counter()
         found = shortest_path.first_actions(
             cost, walls, pose, target, aim, turn, back, running, reach

@@ -71,7 +71,7 @@ ROWS = {
 
 
 def world_tables() -> tuple[list, SceneBatch]:
-    """Two copies of the flat, with random pictures and sound that tells where it comes from."""
+    """Build two copies of the flat, with random pictures and sound that encodes the location."""
     places = [draw("one", FLAT), draw("two", FLAT)]
     generator = torch.Generator().manual_seed(0)
     observed = []
@@ -92,7 +92,7 @@ def world_tables() -> tuple[list, SceneBatch]:
 
 
 def spec_of(row: str, places: list, tables: SceneBatch, **recipe) -> TrainingSpec:
-    """What there is to learn in a row of the table."""
+    """Build the specification of the training of a row of the table."""
     names = ROWS[row]
     both = {**tables.visual, **tables.audio}
     features = {name: both[name].shape[-1] for name in names if name in both}
@@ -107,7 +107,7 @@ def spec_of(row: str, places: list, tables: SceneBatch, **recipe) -> TrainingSpe
 
 
 class Ours:
-    """A training of ours: steps a second, and the return of its last rounds."""
+    """A training of this package: steps per second, and the return of its last rounds."""
 
     def __init__(self, spec: TrainingSpec, steps: int) -> None:
         torch.manual_seed(spec.recipe.train_seed)
@@ -143,13 +143,16 @@ class PeerEnv(VecEnv):
         return {name: value.float().numpy() for name, value in found.items()}
 
     def reset(self):
+        """See `VecEnv.reset`."""
         self.env.begin(torch.ones(N, dtype=torch.bool))
         return self._seen()
 
     def step_async(self, actions):
+        """See `VecEnv.step_async`."""
         self._actions = torch.from_numpy(actions)
 
     def step_wait(self):
+        """See `VecEnv.step_wait`."""
         reward, terminated, truncated = self.env.move(self._actions)
         done, infos = (terminated | truncated).numpy(), [{} for _ in range(N)]
         if done.any():
@@ -160,20 +163,27 @@ class PeerEnv(VecEnv):
             self.env.begin(torch.from_numpy(done))
         return self._seen(), reward.numpy(), done, infos
 
-    def close(self): ...
+    def close(self):
+        """See `VecEnv.close`."""
+
     def get_attr(self, name, indices=None):
+        """See `VecEnv.get_attr`."""
         return [None] * N
 
-    def set_attr(self, name, value, indices=None): ...
+    def set_attr(self, name, value, indices=None):
+        """See `VecEnv.set_attr`."""
+
     def env_method(self, name, *args, indices=None, **kwargs):
+        """See `VecEnv.env_method`."""
         return [None] * N
 
     def env_is_wrapped(self, wrapper, indices=None):
+        """See `VecEnv.env_is_wrapped`."""
         return [False] * N
 
 
 class Returns(BaseCallback):
-    """Mean return of the episodes that ended lately, and the rate of the second half."""
+    """Callback that measures the mean return of late episodes and the rate of the second half."""
 
     def __init__(self, steps: int) -> None:
         super().__init__()
@@ -189,16 +199,18 @@ class Returns(BaseCallback):
         return True
 
     def rate(self) -> float:
+        """Return the steps per second of the second half."""
         (a, t), (b, u) = self.marks[len(self.marks) // 2], self.marks[-1]
         return (b - a) / (u - t)
 
     def earned(self, last: int) -> float:
+        """Return the mean return of the episodes that ended in the last `last` steps."""
         end = self.marks[-1][0]
         return float(np.mean([own for at, own in self.ended if at > end - last]))
 
 
 def peer(tables: SceneBatch, row: str, steps: int, seed: int, threads: int) -> tuple[float, float]:
-    """Steps a second and last return of Stable-Baselines3's A2C."""
+    """Measure steps per second and final return of Stable-Baselines3's A2C."""
     torch.set_num_threads(threads)
     env = PeerEnv(tables, ROWS[row], seed, 200)
     sizes = {
@@ -225,7 +237,7 @@ def peer(tables: SceneBatch, row: str, steps: int, seed: int, threads: int) -> t
 
 
 def environment(tables: SceneBatch) -> None:
-    """Steps a second of the environment alone, with features gathered."""
+    """Measure steps per second of the environment alone, with features gathered."""
     for n in (64, 256, 1024):
         env = WalkEnv(
             BatchedEpisodes(tables, build_start_sampler(tables), n, VAR, 200), ROWS["a3c_va"]
@@ -244,6 +256,7 @@ def environment(tables: SceneBatch) -> None:
 
 
 def main() -> None:
+    """Measure and print."""
     steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
     torch.set_num_threads(1)
     places, tables = world_tables()
@@ -269,8 +282,8 @@ def main() -> None:
             f"return after {steps:,} steps, {name}: {np.mean(values):.2f} +- {np.std(values):.2f}"
         )
     peak = max(
-        resource.getrusage(who).ru_maxrss
-        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+        resource.getrusage(processes).ru_maxrss
+        for processes in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )
     print(f"peak memory of a process: {peak / 1024:.0f} MB")
 

@@ -28,14 +28,14 @@ from avn.views.scenery import scenery
 
 
 def timed(make, *arguments):
-    """What a call gives, and the processor time that it took."""
+    """Return the result of a call and its processor time in seconds."""
     begin = time.process_time()
     made = make(*arguments)
     return made, time.process_time() - begin
 
 
 def run_raycast(plan, centres, headings, views):
-    """Seconds a view with and without its share of the bake."""
+    """Measure seconds for each view, with and without its share of the lighting."""
     Raycast(RaycastConfig(), generate(1, "small", 1, "small"), "train").views(
         centres[:1] * 0 + 1, headings[:1]
     )  # compiles, or loads what is compiled
@@ -54,7 +54,7 @@ def run_raycast(plan, centres, headings, views):
 
 
 def run_cycles(plan, centres, headings):
-    """Seconds a view of Blender's, without its start."""
+    """Measure seconds for each view of Blender, without its start."""
     renderer = Cycles(CyclesConfig(), plan, "train")
     renderer.views(centres[:1], headings[:1])
     return timed(renderer.views, centres, headings)[1] / len(centres)

@@ -1,8 +1,9 @@
-"""Steps a second of the batched simulator against one episode after another in plain Python.
+"""Speed of the batched simulator against one episode after another in plain Python.
 
-In both a greedy agent walks the same episodes and hears the same takes, and they must end with the
-same success, path and place. The peer keeps its tables in lists, which plain Python reads fastest.
-Once with the frozen list of a room, once with every start; then whole rows of the table.
+In both a greedy agent walks the same episodes and hears the same realisations, and they must end
+with the same success, path and position. The peer keeps its tables in lists, which are the fastest
+in plain Python. Once with the frozen list of a room, once with every start; then whole rows of the
+table.
 
     python benchmarks/walking.py
 """
@@ -53,7 +54,7 @@ cc##ccccC#ddddddd
 
 @dataclass
 class SceneBatch:
-    """What the peer looks up, as lists."""
+    """Tables of the peer, as lists."""
 
     table: list[list[int]]
     lattice: list[list[int]]
@@ -78,7 +79,7 @@ class PlainEpisode:
         self.front = ((0, 1), (1, 0), (0, -1), (-1, 0))[start % 4]
 
     def step(self, action: int) -> dict:
-        """One action."""
+        """Execute one action and return the observation."""
         after = self.tables.table[self.state][action]
         moving = action <= BACKWARD
         self.collided = moving and after == self.state
@@ -90,10 +91,10 @@ class PlainEpisode:
         return self.observe()
 
     def observe(self) -> dict:
-        """What the agent perceives."""
+        """Return the agent's observation."""
         x, y = self.tables.lattice[self.state // 4]
         dx, dy = x - self.origin[0], y - self.origin[1]
-        take = self.realisations[self.actions]
+        realisation = self.realisations[self.actions]
         return {
             "collided": self.collided,
             "odometry": (
@@ -101,7 +102,9 @@ class PlainEpisode:
                 dx * self.front[0] + dy * self.front[1],
                 (self.state - self.start) % 4,
             ),
-            "source_estimate": self.tables.hearing[self.source][self.state][self.sound][take],
+            "source_estimate": self.tables.hearing[self.source][self.state][self.sound][
+                realisation
+            ],
         }
 
 
@@ -112,7 +115,7 @@ class PlainGreedy:
         self.patience, self.turns = patience, 0
 
     def act(self, observation: dict) -> int:
-        """One action."""
+        """Choose one action."""
         right, front = observation["source_estimate"]
         if (front > 0 and front >= abs(right)) or self.turns >= self.patience:
             self.turns = 0
@@ -169,7 +172,7 @@ def compare(place: DrawnPlace, episodes: Episodes) -> None:
 
 
 def made_up_hearing(place: DrawnPlace) -> Tensor:
-    """The true locations with an error of 2 m, (K, S, sounds, takes, 2)."""
+    """Return the true locations with an error of 2 m, (K, S, sounds, realisations, 2)."""
     centres = torch.from_numpy(place.grid.centres).float()
     offset = centres[torch.from_numpy(place.sources).long()][:, None] - centres
     east, north = offset.unbind(dim=-1)
@@ -181,7 +184,7 @@ def made_up_hearing(place: DrawnPlace) -> Tensor:
 
 
 def rows(places: list[DrawnPlace]) -> None:
-    """Seconds of a row of the table: five rooms, three sounds, 1,500 episodes."""
+    """Measure the time of a row of the table: five rooms, three sounds, 1,500 episodes."""
     for name, agent in (("random_walk", RandomWalk()), ("greedy", Greedy()), ("oracle", Oracle())):
         begin = time.perf_counter()
         frames = []

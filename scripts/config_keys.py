@@ -1,4 +1,4 @@
-"""Every config key with its type, default and meaning, as composed configs have it."""
+"""All config keys with their types, defaults and meanings, from composed configs."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def composing() -> Iterator[None]:
 
 
 def groups() -> list[Group]:
-    """All config groups, in the order in which a config has them, then `agent` and `model`."""
+    """List all config groups, in the order of a config, then `agent` and `model`."""
     found = []
     folders = {folder.name for folder in conf_folder().iterdir() if folder.is_dir()}
     own = [name for name in map(str, composed("eval")) if name in folders - {"agent", "model"}]
@@ -90,7 +90,7 @@ def groups() -> list[Group]:
 
 
 def commands(known: set[str]) -> list[Group]:
-    """Keys beside the groups: those of all commands, then those of each.
+    """List the keys outside of groups: those of all commands, then those of each.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def commands(known: set[str]) -> list[Group]:
 
 
 def _keys(holder: DictConfig, name: str, files: list[Path], path: str = "") -> Iterator[Key]:
-    """A key of a node, or the keys below it where it is a node of settings."""
+    """Yield a key of a node, or the keys below it if it is a node of settings."""
     node: Any = holder._get_node(name)
     dotted = f"{path}{name}"
     if _has_settings(node):
@@ -134,12 +134,12 @@ def _keys(holder: DictConfig, name: str, files: list[Path], path: str = "") -> I
 
 
 def _below(dotted: str) -> str:
-    """A key as the file of its option has it, without the group."""
+    """Return a key as in the file of its option, without the group."""
     return dotted.partition(".")[2] or dotted
 
 
 def _has_settings(node: Any) -> bool:
-    """Whether a node is one of settings, and no mapping whose keys are the user's."""
+    """Return True for a node of settings, False for a mapping whose keys are the user's."""
     if not isinstance(node, DictConfig) or node._is_interpolation() or node._is_missing():
         return False
     of_any = node._metadata.element_type in (Any, None)
@@ -149,7 +149,7 @@ def _has_settings(node: Any) -> bool:
 
 
 def _kind(node: Any) -> str:
-    """The type of a node: that of its schema, else that of its value."""
+    """Return the type of a node: that of its schema, else that of its value."""
     declared = node._metadata.ref_type
     if dataclasses.is_dataclass(declared):
         return "settings"
@@ -166,7 +166,7 @@ def _type_name(declared: Any) -> str:
 
 
 def _value(raw: Any) -> str:
-    """A value as the command line takes it."""
+    """Format a value as on the command line."""
     if raw == "???":
         return "???"
     if isinstance(raw, dict):
@@ -190,7 +190,7 @@ def _share_meanings(group: Group) -> None:
 
 
 def gaps(found: list[Group]) -> list[str]:
-    """Keys without a meaning, and options without a description."""
+    """List keys without a meaning, and options without a description."""
     options = [f"{g.name}={name}" for g in found for name, text in g.options.items() if not text]
     keys = {k.name for g in found for own in g.keys.values() for k in own.values() if not k.meaning}
     return options + sorted(keys)

@@ -25,26 +25,26 @@ _COMMENT = re.compile(r"(?:^|\s)#\s*(.*)$")
 
 
 def described(node: DictConfig, name: str) -> tuple[str, str]:
-    """Type and meaning of a key as the docstrings of its node's classes give them.
+    """Return type and meaning of a key from the docstrings of its node's classes.
 
-    Either is empty where no docstring has it.
+    Either is empty if no docstring has it.
     """
     return _first(_classes(node), name)
 
 
 def target_of(node: DictConfig) -> str:
-    """The class that a node names; empty where it names none."""
+    """Return the name of the class of a node; empty if it has none."""
     raw: Any = OmegaConf.to_container(node, resolve=False)
     return str(raw.get("_target_") or "")
 
 
 def summary_of(target: str) -> str:
-    """First line of the docstring of what a dotted name names."""
+    """Return the first line of the docstring of the object of a dotted name."""
     return (inspect.getdoc(_imported(target)) or "").split("\n")[0]
 
 
 def _classes(node: DictConfig) -> Iterator[object]:
-    """The node's dataclass and the class that it names, each with its base classes."""
+    """Return the dataclass of a node and the class that it names, each with its base classes."""
     for found in (OmegaConf.get_type(node), _imported(target_of(node))):
         yield from _with_bases(found)
 
@@ -54,12 +54,12 @@ def _with_bases(found: object) -> tuple[object, ...]:
 
 
 def _first(owners: Iterable[object], name: str) -> tuple[str, str]:
-    """Type and meaning of a key in the first docstring that has it."""
+    """Return type and meaning of a key from the first docstring that has it."""
     return next((own for own in (_entry(owner, name) for owner in owners) if own[1]), ("", ""))
 
 
 def _imported(target: str) -> object:
-    """What a dotted name names; None where its package is not installed."""
+    """Import the object of a dotted name; return None if its package is not installed."""
     module, _, name = target.rpartition(".")
     if not module:
         return None
@@ -86,7 +86,7 @@ def _entry(owner: object, name: str) -> tuple[str, str]:
 
 @cache
 def _entries(docstring: str) -> dict[str, tuple[list[str], str, str]]:
-    """For each name in a numpydoc docstring: all names of its entry, their type, and the text."""
+    """Map each name in a numpydoc docstring to all names of its entry, their type, and the text."""
     found: dict[str, tuple[list[str], str, str]] = {}
     section = ""
     names: list[str] = []
@@ -109,7 +109,7 @@ def _entries(docstring: str) -> dict[str, tuple[list[str], str, str]]:
 
 @cache
 def comments(path: Path) -> dict[str, str]:
-    """Comment of each dotted key of a YAML file, and under "" that of the file itself."""
+    """Read the comment of each dotted key of a YAML file, and under "" that of the file itself."""
     found: dict[str, str] = {}
     above: list[str] = []
     parents: list[tuple[int, str]] = []

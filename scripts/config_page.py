@@ -35,7 +35,7 @@ ADVICE = (
 
 
 def page(found: list[Group], readers: Readers) -> str:
-    """The page in Markdown.
+    """Format the page in Markdown.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def page(found: list[Group], readers: Readers) -> str:
 
 
 def _table(group: Group, readers: Readers) -> list[str]:
-    """The table of a group's keys, without a column of readers where all have the same."""
+    """Format the table of a group's keys, without a column of readers if all have the same."""
     rows = _rows(group)
     names = [_stages(group, next(iter(row.values())), readers) for row in rows]
     head, ruler = "| key | type | default | meaning |", "| --- | --- | --- | --- |"
@@ -74,7 +74,7 @@ def _stages(group: Group, key: Key, readers: Readers) -> str:
 
 
 def _rows(group: Group) -> list[dict[str, Key]]:
-    """The key of each option for each row; what options say alike stands in one."""
+    """Return the key of each option for each row; equal descriptions share a row."""
     found: dict[tuple[object, ...], dict[str, Key]] = {}
     for option, keys in group.keys.items():
         for key in keys.values():
@@ -97,7 +97,7 @@ def _row(group: Group, row: dict[str, Key]) -> str:
 
 
 def _defaults(row: dict[str, Key]) -> str:
-    """The default that most options have, then those of the others."""
+    """Format the default of most options, then those of the others."""
     if all(key.default == option for option, key in row.items()):
         return "name of the option"
     having: dict[str, list[str]] = {}
@@ -118,7 +118,7 @@ def _cell(text: str) -> str:
 
 
 def survey() -> tuple[list[Group], Readers]:
-    """All groups and keys, and who reads them."""
+    """Find all groups and keys, and the stages that read them."""
     with composing():
         found = groups()
         keys, values = {}, {}
@@ -134,7 +134,7 @@ def survey() -> tuple[list[Group], Readers]:
 
 
 def main() -> int:
-    """Write the page, unless a key is described nowhere."""
+    """Write the page, unless a key has no description."""
     found, readers = survey()
     if missing := gaps(found):
         print(f"no meaning: {', '.join(missing)}; {ADVICE}", file=sys.stderr)

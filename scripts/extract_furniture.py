@@ -44,7 +44,7 @@ DARKEST, BRIGHTEST = 0.015, 0.85
 
 @dataclass
 class Origin:
-    """What the library says of a model."""
+    """Record of a model in its library."""
 
     title: str
     author: str
@@ -89,11 +89,11 @@ class Libraries:
             )
 
     def origin(self, name: str) -> Origin:
-        """What the library says of `library/model`."""
+        """Return the record of `library/model`."""
         return self._origins[name]
 
     def shape(self, name: str) -> Shape:
-        """The model in the frame of a piece, u and v and w each from 0 to 1."""
+        """Return the model in the frame of a piece, u and v and w each from 0 to 1."""
         origin = self.origin(name)
         model = read_obj(origin.path)
         at = model.vertices
@@ -108,7 +108,7 @@ class Libraries:
 
 
 def put_together(entry: Entry, libraries: Libraries) -> Shape:
-    """The parts of an entry as one shape."""
+    """Join the parts of an entry to one shape."""
     vertices, uv, look = [], [], []
     looks: list[Look] = []
     for part in entry.parts:
@@ -129,7 +129,7 @@ def put_together(entry: Entry, libraries: Libraries) -> Shape:
 
 @cache
 def picture(path: Path) -> bytes:
-    """A picture of a library, small, as the bytes of a JPEG file."""
+    """Scale a picture of a library down and return the bytes of a JPEG file."""
     with Image.open(path) as image:
         rgba = image.convert("RGBA")
     # What is cut out of a leaf's picture takes the colour of what is left.
@@ -145,7 +145,7 @@ def picture(path: Path) -> bytes:
 
 
 def store(name: str, shape: Shape) -> set[str]:
-    """Write a model's file; gives the hashes of its pictures."""
+    """Write a model's file and return the hashes of its pictures."""
     used, look = np.unique(shape.look, return_inverse=True)
     looks = [shape.looks[i] for i in used]
     paths = sorted({path for _, path in looks if path is not None})
@@ -173,7 +173,7 @@ def store(name: str, shape: Shape) -> set[str]:
 
 
 def true_size(entry: Entry, libraries: Libraries) -> tuple[float, float, float]:
-    """Width, depth and height in metres: what the library says of what is kept of the model."""
+    """Return width, depth and height in metres of the part of the model that is kept."""
     if entry.size:
         return entry.size
     source = next(part for part in entry.parts if isinstance(part, Source))
@@ -184,7 +184,7 @@ def true_size(entry: Entry, libraries: Libraries) -> tuple[float, float, float]:
 
 
 def row_of(entry: Entry, name: str, libraries: Libraries) -> dict[str, Any]:
-    """The entry's row of the catalogue."""
+    """Build the entry's row of the catalogue."""
     origins = [libraries.origin(p.name) for p in entry.parts if isinstance(p, Source)]
     return {
         "name": name,
@@ -200,7 +200,7 @@ def row_of(entry: Entry, name: str, libraries: Libraries) -> dict[str, Any]:
 
 
 def name_of(entry: Entry) -> str:
-    """What an entry is called: its own name, or that of its only source."""
+    """Return the name of an entry: its own, or that of its only source."""
     source = next((part.name for part in entry.parts if isinstance(part, Source)), "")
     return entry.name or re.sub(r"\W", "_", source).lower()
 

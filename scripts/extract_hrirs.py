@@ -24,7 +24,7 @@ CHANNELS, TAPS, RATE = 16, 256, 48000
 
 
 def read_member(archive: tarfile.TarFile, name: str) -> bytes:
-    """Bytes of one file of the package."""
+    """Read the bytes of one file of the package."""
     member = archive.extractfile(name)
     if member is None:
         raise SystemExit(f"{name} is not in the archive")
@@ -32,7 +32,7 @@ def read_member(archive: tarfile.TarFile, name: str) -> bytes:
 
 
 def decode(script: str) -> np.ndarray:
-    """The (256, 16) PCM16 samples of the list `OmnitoneTOAHrirBase64`."""
+    """Decode the (256, 16) PCM16 samples of the list `OmnitoneTOAHrirBase64`."""
     found = re.search(r"const OmnitoneTOAHrirBase64 = \[(.*?)\];", script, re.S)
     if found is None:
         raise SystemExit("OmnitoneTOAHrirBase64 is not in the script")

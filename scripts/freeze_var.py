@@ -22,7 +22,7 @@ from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
 from avn.apartments.splits import FROZEN
-from avn.apartments.symmetry import layout_key, likeness
+from avn.apartments.symmetry import layout_key, layout_similarity
 from avn.reporting.floor_plan_figure import save_floor_plan
 
 TRAIN_CELLS, TEST_CELLS = 330, 602
@@ -38,7 +38,7 @@ DISLIKED: dict[str, tuple[int, ...]] = {"airy": (), "roomy": ()}
 
 @dataclass(frozen=True)
 class Candidate:
-    """An apartment that may be chosen."""
+    """A candidate apartment."""
 
     plan: FloorPlan
     seed: int
@@ -48,7 +48,7 @@ class Candidate:
 
 
 def candidates(size: str, seeds: int, sources: int, band: tuple[float, float]) -> list[Candidate]:
-    """All apartments of a size, none like another, whose hardness is within the band."""
+    """Generate dissimilar apartments of a size whose difficulty is within the band."""
     found, seen = [], set()
     for seed in range(seeds):
         if seed in DISLIKED[size]:
@@ -68,25 +68,27 @@ def candidates(size: str, seeds: int, sources: int, band: tuple[float, float]) -
 
 
 def choose_training(pool: list[Candidate]) -> list[Candidate]:
-    """Of the pairs that add up to 330 cells the two that look least alike."""
+    """Choose the least similar pair of those with 330 cells in all."""
     pairs = [(a, b) for a, b in combinations(pool, 2) if a.cells + b.cells == TRAIN_CELLS]
     if not pairs:
         raise SystemExit(f"no pair of {len(pool)} apartments has {TRAIN_CELLS} cells")
-    first, second = min(pairs, key=lambda p: (likeness(p[0].plan, p[1].plan), p[0].seed, p[1].seed))
+    first, second = min(
+        pairs, key=lambda p: (layout_similarity(p[0].plan, p[1].plan), p[0].seed, p[1].seed)
+    )
     return [first, second]
 
 
 def unlike(pool: list[Candidate], others: list[Candidate]) -> list[Candidate]:
-    """Those of the pool that look like none of the others, nor like one before them."""
+    """Filter the pool for apartments dissimilar to the others and to earlier ones of the pool."""
     kept: list[Candidate] = []
     for candidate in pool:
-        if all(likeness(candidate.plan, c.plan) <= ALIKE for c in others + kept):
+        if all(layout_similarity(candidate.plan, c.plan) <= ALIKE for c in others + kept):
             kept.append(candidate)
     return kept
 
 
 def choose_test(pool: list[Candidate]) -> list[Candidate]:
-    """Five with 602 cells, of four and of five rooms, nearest to the paper's random walk."""
+    """Choose five with 602 cells in all, of four and five rooms, nearest to the paper's walk."""
     best: tuple[float, tuple[Candidate, ...]] | None = None
     for five in combinations(pool, 5):
         rooms = [len(c.plan.rooms) for c in five]

@@ -1,4 +1,4 @@
-"""Whose work the furniture models are, and on which terms: what goes into the assets' README.
+"""Credits and licences of the furniture models, for the assets' README.
 
 Read by `extract_furniture.py`.
 """
@@ -29,7 +29,7 @@ _LINKS = {
 
 
 def licences(package: Path) -> dict[str, str]:
-    """The texts of the licences, as Debian's copyright file of the package has them."""
+    """Read the texts of the licences from Debian's copyright file of the package."""
     path = next(package.rglob("sweethome3d-furniture/copyright"))
     found = {}
     for block in re.split(r"\n\n(?=\S)", path.read_text(encoding="utf-8")):
@@ -44,7 +44,7 @@ def licences(package: Path) -> dict[str, str]:
 
 
 def credits_of(rows: list[dict[str, Any]]) -> str:
-    """README.md of the assets: where the models come from, who made them, what was changed."""
+    """Format README.md of the assets: origin, authors and changes of the models."""
     groups = [
         ("CC0 1.0 (`LICENSE.CC0-1.0.txt`), with thanks", "CC0-1.0"),
         ("CC BY 3.0 Unported (`LICENSE.CC-BY-3.0.txt`)", "CC-BY-3.0"),

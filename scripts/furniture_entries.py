@@ -1,4 +1,4 @@
-"""What a row of `furniture_list.py` says: a model of a library, or one put together."""
+"""Entries of `furniture_list.py`: models of a library, or models of several parts."""
 
 from __future__ import annotations
 
@@ -64,14 +64,14 @@ def one(
     size: tuple[float, float, float] | None = None,
     triangles: int = 9000,
 ) -> Entry:
-    """An entry that is one model of a library."""
+    """Make an entry of one model of a library."""
     return Entry(kinds, pool, [Source(source, bend=bend or {})], row, size, tint, triangles)
 
 
 def planted(
     source: str, pool: str, pot: tuple[float, float, float], low: float, sunk: float
 ) -> Entry:
-    """A plant in a square planter that is `low` of the height; its own pot sinks in by `sunk`."""
+    """Put a plant into a square planter of `low` times the height; its pot sinks in by `sunk`."""
     soil = (0.05, 0.035, 0.025)
     return Entry(
         "plant",
@@ -93,7 +93,7 @@ def cabinet(
     doors: int,
     drawer: bool,
 ) -> list[Source | Slab]:
-    """A cabinet of boxes: body, plinth and worktop where `top` is given, doors with handles."""
+    """Make a cabinet of boxes: body, plinth, worktop if `top` is given, doors with handles."""
     low, high = (0.11, 0.955) if top else (0.02, 0.99)
     parts: list[Source | Slab] = [Slab((0, 0, low - 0.02, 1, 0.93, high), body)]
     if top:

@@ -1,4 +1,4 @@
-"""Which models are taken from which library, for which kinds of piece and which pool.
+"""Furniture models to extract: library, kinds of piece and pool of each.
 
 Libraries: `cc0` BlendSwap-CC-0, `ccby` BlendSwap-CC-BY, `scopia` Scopia, `kator` KatorLegaz.
 Read by `extract_furniture.py`.

@@ -1,4 +1,4 @@
-"""What is done to a furniture model's triangles on their way into the package.
+"""Processing of a furniture model's triangles.
 
 Read by `extract_furniture.py`.
 """
@@ -27,13 +27,13 @@ class Shape:
 
 
 def unit(at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Scaled so that each coordinate runs from 0 to 1."""
+    """Scale points so that each coordinate runs from 0 to 1."""
     low = at.min(axis=(0, 1))
     return (at - low) / np.maximum(at.max(axis=(0, 1)) - low, 1e-9)
 
 
 def box(slab: Slab) -> Shape:
-    """The twelve triangles of a plain box."""
+    """Build the twelve triangles of a plain box."""
     faces = []
     for axis in range(3):
         for end in (0.0, 1.0):
@@ -46,7 +46,7 @@ def box(slab: Slab) -> Shape:
 
 
 def bent(part: Source, shape: Shape) -> Shape:
-    """The shape with its extents mapped as `part.bend` says."""
+    """Map the extents of a shape as `part.bend` says."""
     at = shape.vertices.copy()
     for axis, knots in part.bend.items():
         given, wanted = np.array(knots, dtype=float).T
@@ -78,7 +78,7 @@ def cut_down(shape: Shape, size: tuple[float, float, float], most: int) -> Shape
 
 
 def with_area(at: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which triangles (metres) have an area that a picture could show."""
+    """Return True for triangles (metres) of an area that a picture can show."""
     normal = np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])
     area: NDArray[np.bool_] = np.linalg.norm(normal, axis=-1) > 1e-9
     return area

@@ -1,4 +1,4 @@
-"""The part of `furniture_list.py` that stands in kitchens and bathrooms."""
+"""Entries of `furniture_list.py` for kitchens and bathrooms."""
 
 from __future__ import annotations
 

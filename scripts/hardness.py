@@ -1,4 +1,4 @@
-"""How hard an apartment is: what a walk without aim achieves in it, and how far things are.
+"""Difficulty of an apartment: performance of a uniform random walk, and distances.
 
 The figures are exact, not sampled. Under the protocol `var` the uniform walk draws from
 forward, backward, rotate left and rotate right. Rotations are free, so only the axis of the
@@ -18,7 +18,7 @@ from avn.apartments.grid import Grid, goal_cells, source_cells
 from avn.apartments.surfaces import build_surfaces, line_of_sight
 
 KEEPS_AXIS = 2 / 3
-EARS, SOURCE = 1.5, 1.0
+RECEIVER_HEIGHT, SOURCE_HEIGHT = 1.5, 1.0  # metres
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Hardness:
     other_room : float
         Share of starts in another room than the source.
     out_of_sight : float
-        Share of starts from whose ears (1.5 m) the source (1.0 m) is not in a straight line.
+        Share of starts without a line of sight from the receiver (1.5 m) to the source (1.0 m).
     detour : float
         Mean ratio of geodesic to Euclidean distance.
     """
@@ -47,7 +47,7 @@ class Hardness:
 def random_walk_odds(
     grid: Grid, source: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Success and SPL of the uniform random walk from every cell to one source.
+    """Compute success and SPL of the uniform random walk from every cell to one source.
 
     An episode ends after twice as many attempted moves as the source cell is away; p is the
     number of attempted moves and l that of the shortest walk to the goal cells.
@@ -83,12 +83,12 @@ def random_walk_odds(
 def hardness(plan: FloorPlan, grid: Grid) -> Hardness:
     """Measure an apartment over every source and start; see `Hardness`."""
     surfaces = build_surfaces(plan)
-    ears = np.column_stack([grid.centres, np.full(grid.cells, EARS)])
+    receivers = np.column_stack([grid.centres, np.full(grid.cells, RECEIVER_HEIGHT)])
     rows = []
     for source in source_cells(plan, grid):
         success, spl, start = random_walk_odds(grid, int(source))
-        mouth = np.broadcast_to([*grid.centres[source], SOURCE], ears.shape)
-        hidden = ~line_of_sight(surfaces, mouth, ears)
+        position = np.broadcast_to([*grid.centres[source], SOURCE_HEIGHT], receivers.shape)
+        hidden = ~line_of_sight(surfaces, position, receivers)
         away = grid.rooms != grid.rooms[source]
         straight = np.hypot(*(grid.centres - grid.centres[source]).T)
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,8 +1,7 @@
-"""Hook of mkdocs: pages of the site that do not lie in `docs/`, and links between all of them.
+"""Hook of mkdocs: pages of the site from outside of `docs/`, and links between all pages.
 
-README.md, CONTRIBUTING.md and CHANGELOG.md are pages as they stand, and each package of `src/avn`
-has a page of its API. Links are written for whoever reads the files in the repository; here they
-are made to lead to the pages.
+README.md, CONTRIBUTING.md and CHANGELOG.md are pages, and each package of `src/avn` has a page of
+its API. Links in the files are relative to the repository; here they are rewritten to the pages.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages that do not lie in `docs/`."""
+    """Add the pages from outside of `docs/`."""
     contents = {page: (TOP / name).read_text() for page, name in PAGES.items()}
     contents |= {f"api/{name}.md": _api(f"avn.{name}", PACKAGE / name) for name in packages()}
     contents["api/commands.md"] = _api("avn", PACKAGE)
@@ -50,7 +49,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Make links lead to pages."""
+    """Rewrite links to the pages of the site."""
     uri = page.file.src_uri
     if uri.startswith("api/"):
         return markdown
@@ -59,12 +58,12 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def packages() -> list[str]:
-    """The packages of `avn`."""
+    """List the packages of `avn`."""
     return sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py"))
 
 
 def rewritten(text: str, source: Path) -> str:
-    """A Markdown file with links to pages of the site, fenced code left as it is."""
+    """Rewrite the links of a Markdown file to pages of the site, except in fenced code."""
 
     def link(match: re.Match[str]) -> str:
         image, label, target, anchor = match.groups()
@@ -91,7 +90,7 @@ def rewritten(text: str, source: Path) -> str:
 
 
 def _page(path: Path) -> str | None:
-    """Where a file of the repository lies in the site."""
+    """Return the path in the site of a file of the repository."""
     for page, name in PAGES.items():
         if path == TOP / name:
             return page
@@ -101,7 +100,7 @@ def _page(path: Path) -> str | None:
 
 
 def _api(name: str, folder: Path) -> str:
-    """The page of a package: all its modules."""
+    """Format the page of a package: all its modules."""
     modules = [f"{name}.{path.stem}" for path in _modules(folder)]
     return "\n\n".join([f"# {name}", *(f"::: {module}" for module in modules)]) + "\n"
 

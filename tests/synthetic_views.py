@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from avn.datamodules.views import Seen
+from avn.datamodules.views import ApartmentViews
 from avn.modules.window_net import probe_places
 from avn.views.camera import CameraConfig
 
 
-def synthetic_views(count: int, seed: int, size: int = 32, looks: int = 1) -> Seen:
+def synthetic_views(count: int, seed: int, size: int = 32, looks: int = 1) -> ApartmentViews:
     """Random windows; each free cell brightens the picture where its floor is."""
     rng = np.random.default_rng(seed)
     free, visible = rng.random((count, 5, 5)) < 0.5, rng.random((count, 5, 5)) < 0.9
@@ -21,4 +21,4 @@ def synthetic_views(count: int, seed: int, size: int = 32, looks: int = 1) -> Se
         rgb.append(views)
     depth = rng.uniform(1, 5, (count, size, size)).astype(np.float16)
     depth[:, :4] = 0
-    return Seen(rgb, [depth] * looks, free, visible)
+    return ApartmentViews(rgb, [depth] * looks, free, visible)

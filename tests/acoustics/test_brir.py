@@ -73,11 +73,11 @@ def test_turning_the_agent_is_turning_the_world_for_the_first_arrival(
     config: AcousticsConfig,
 ) -> None:
     blocks = walls(two_rooms())
-    ears = np.array([[2.0, 3.0, 1.5], [4.5, 3.0, 1.5], [5.5, 0.5, 1.5]])
-    first = render_direct_paths(blocks, SOURCE, ears, config)
+    receivers = np.array([[2.0, 3.0, 1.5], [4.5, 3.0, 1.5], [5.5, 0.5, 1.5]])
+    first = render_direct_paths(blocks, SOURCE, receivers, config)
     x0, y0, x1, y1 = blocks.T
     other = render_direct_paths(
-        np.column_stack([y0, -x1, y1, -x0]), turned_points(SOURCE), turned_points(ears), config
+        np.column_stack([y0, -x1, y1, -x0]), turned_points(SOURCE), turned_points(receivers), config
     )
     # Who faced north and is turned with the world faces east.
     assert np.abs(first.samples.astype(int) - np.roll(other.samples, -1, axis=1)).max() <= 1
@@ -89,12 +89,12 @@ def test_turning_the_agent_is_turning_the_world_for_the_reverberation() -> None:
     # Behind a doorway between rooms that absorb much, what comes through it is what is heard.
     # Drawn signs make echoes cancel or not; over many places near each other that evens out.
     surfaces = build_surfaces(two_rooms())
-    ears = np.array([[x, y, 1.5] for x in np.arange(3.6, 5.7, 0.3) for y in (0.5, 1.0, 1.5)])
+    receivers = np.array([[x, y, 1.5] for x in np.arange(3.6, 5.7, 0.3) for y in (0.5, 1.0, 1.5)])
     config = dataclasses.replace(CONFIG, rays=10000)
     much = np.full((len(surfaces.materials), 6), 0.7)
-    one = render_source(surfaces, SOURCE, ears, config, absorption=much)
+    one = render_source(surfaces, SOURCE, receivers, config, absorption=much)
     other = render_source(
-        turned(surfaces), turned_points(SOURCE), turned_points(ears), config, absorption=much
+        turned(surfaces), turned_points(SOURCE), turned_points(receivers), config, absorption=much
     )
     here, there = (
         decibel(((t.samples * t.scale[:, None, None, None]) ** 2).sum(axis=(0, 3)))
@@ -172,20 +172,22 @@ def test_the_omnidirectional_channel_keeps_the_traced_energy() -> None:
 
 
 def test_direct_to_reverberant_ratio_falls_with_distance() -> None:
-    ears = np.array([[1.0 + d, 1.0 + d / 2, 1.5] for d in (0.5, 1.2, 2.2, 3.5)])
+    receivers = np.array([[1.0 + d, 1.0 + d / 2, 1.5] for d in (0.5, 1.2, 2.2, 3.5)])
     surfaces = shoebox(ROOM, "plaster")
-    tail = render_source(surfaces, SOURCE, ears, CONFIG)
-    first = render_direct_paths(np.zeros((0, 4)), SOURCE, ears, CONFIG)
-    reverberant = ((tail.samples * tail.scale[:, None, None, None]) ** 2).sum(axis=(1, 2, 3))
+    reverberation = render_source(surfaces, SOURCE, receivers, CONFIG)
+    first = render_direct_paths(np.zeros((0, 4)), SOURCE, receivers, CONFIG)
+    reverberant = ((reverberation.samples * reverberation.scale[:, None, None, None]) ** 2).sum(
+        axis=(1, 2, 3)
+    )
     direct = ((first.samples * first.scale[:, None, None, None]) ** 2).sum(axis=(1, 2, 3))
     assert (np.diff(decibel(direct / reverberant)) < -2).all()
 
 
 def test_bytes_do_not_depend_on_the_number_of_processes() -> None:
     surfaces = build_surfaces(two_rooms())
-    ears = np.array([[x, y, 1.5] for x in (0.5, 2.0, 4.5) for y in (0.5, 2.5)])
+    receivers = np.array([[x, y, 1.5] for x in (0.5, 2.0, 4.5) for y in (0.5, 2.5)])
     config = dataclasses.replace(CONFIG, rays=300)
-    jobs = [(surfaces, np.array([x, 1.0, 1.0]), ears, config) for x in (1.0, 5.0)]
+    jobs = [(surfaces, np.array([x, 1.0, 1.0]), receivers, config) for x in (1.0, 5.0)]
     alone = [render_source(*job) for job in jobs]
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         shared = pool.starmap(render_source, jobs)
@@ -197,10 +199,10 @@ def test_bytes_do_not_depend_on_the_number_of_processes() -> None:
 
 def test_listeners_in_other_company_hear_the_same() -> None:
     surfaces = build_surfaces(two_rooms())
-    ears = np.array([[x, y, 1.5] for x in (0.5, 1.5, 2.5, 4.5, 5.5) for y in (0.5, 2.5)])
+    receivers = np.array([[x, y, 1.5] for x in (0.5, 1.5, 2.5, 4.5, 5.5) for y in (0.5, 2.5)])
     config = dataclasses.replace(CONFIG, rays=300)
-    everyone = render_source(surfaces, SOURCE, ears, config)
-    few = trace(surfaces, SOURCE, ears[:3], rays=300, seconds=0.3)
+    everyone = render_source(surfaces, SOURCE, receivers, config)
+    few = trace(surfaces, SOURCE, receivers[:3], rays=300, seconds=0.3)
     samples, scale = binaural_responses(
         few, Binaural.prepare(head_filters(16000), 4800, 16000), 16000
     )
@@ -226,12 +228,12 @@ def test_what_is_cut_off_is_measured() -> None:
 
 
 def test_combining_adds_the_first_arrival_at_its_onset() -> None:
-    ears = np.array([[3.0, 2.0, 1.5]])
-    tail = render_source(shoebox(ROOM, "plaster"), SOURCE, ears, CONFIG)
-    first = render_direct_paths(np.zeros((0, 4)), SOURCE, ears, CONFIG)
-    added = combine(tail, first) - tail.samples * tail.scale[0]
+    receivers = np.array([[3.0, 2.0, 1.5]])
+    reverberation = render_source(shoebox(ROOM, "plaster"), SOURCE, receivers, CONFIG)
+    first = render_direct_paths(np.zeros((0, 4)), SOURCE, receivers, CONFIG)
+    added = combine(reverberation, first) - reverberation.samples * reverberation.scale[0]
     onset, taps = int(first.onset[0]), first.samples.shape[-1]
-    assert onset == round(np.linalg.norm(ears[0] - SOURCE) / SPEED_OF_SOUND * 16000)
+    assert onset == round(np.linalg.norm(receivers[0] - SOURCE) / SPEED_OF_SOUND * 16000)
     assert added[0, ..., onset : onset + taps] == pytest.approx(
         first.samples[0] * first.scale[0], abs=1e-7
     )
@@ -240,9 +242,9 @@ def test_combining_adds_the_first_arrival_at_its_onset() -> None:
 
 def test_first_arrivals_of_a_regime_have_one_length() -> None:
     """So that those of several sources can be stacked, behind walls or not."""
-    ears = np.array([[2.0, 2.0, 1.5]])
+    receivers = np.array([[2.0, 2.0, 1.5]])
     lengths = {
-        render_direct_paths(blocks, SOURCE, ears, DIFFRACTION).samples.shape
+        render_direct_paths(blocks, SOURCE, receivers, DIFFRACTION).samples.shape
         for blocks in (np.zeros((0, 4)), walls(two_rooms()))
     }
     assert len(lengths) == 1

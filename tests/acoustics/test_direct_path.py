@@ -106,25 +106,25 @@ def bearing(vector: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def test_round_corners_the_first_arrival_comes_from_the_doorway() -> None:
     source = np.array([1.0, 4.0, 1.0])
-    listeners = np.array([[4.5, 3.0, 1.5], [5.5, 4.0, 1.5], [3.5, 2.5, 1.5]])
-    paths = find_paths("diffraction", walls(three_rooms()), source, listeners)
+    receivers = np.array([[4.5, 3.0, 1.5], [5.5, 4.0, 1.5], [3.5, 2.5, 1.5]])
+    paths = find_paths("diffraction", walls(three_rooms()), source, receivers)
     assert paths.bent.all()
     doorway = np.array([3.0, 1.0])
-    off = bearing(paths.arrival[:, :2]) - bearing(doorway - listeners[:, :2])
-    reach = np.linalg.norm(listeners[:, :2] - doorway, axis=1)
+    off = bearing(paths.arrival[:, :2]) - bearing(doorway - receivers[:, :2])
+    reach = np.linalg.norm(receivers[:, :2] - doorway, axis=1)
     # Within the half width of the doorway, as it is seen from there.
     assert (np.abs(off) < np.rad2deg(np.arctan2(0.46, reach))).all()
     # The straight line would come from elsewhere.
-    straight = find_paths("transmission", walls(three_rooms()), source, listeners)
-    away = np.abs(bearing(straight.arrival[:, :2]) - bearing(doorway - listeners[:, :2]))
+    straight = find_paths("transmission", walls(three_rooms()), source, receivers)
+    away = np.abs(bearing(straight.arrival[:, :2]) - bearing(doorway - receivers[:, :2]))
     assert (away > 20).all()
 
 
 def test_ears_hear_the_doorway_and_not_the_wall() -> None:
     """Facing west in the middle room, the doorway is on the left and the source on the right."""
-    source, listener = np.array([1.0, 4.5, 1.0]), np.array([[4.0, 3.0, 1.5]])
+    source, receiver = np.array([1.0, 4.5, 1.0]), np.array([[4.0, 3.0, 1.5]])
     for config, louder in ((DIFFRACTION, 0), (RESONANCE, 1)):
-        first = render_direct_paths(walls(three_rooms()), source, listener, config)
+        first = render_direct_paths(walls(three_rooms()), source, receiver, config)
         energy = (responses(first)[0, 3] ** 2).sum(axis=-1)
         assert energy.argmax() == louder
         assert abs(10 * np.log10(energy[0] / energy[1])) > 3
@@ -132,12 +132,12 @@ def test_ears_hear_the_doorway_and_not_the_wall() -> None:
 
 def test_the_way_round_one_screen_is_the_length_of_its_legs() -> None:
     screen = np.array([[-10.0, -0.05, 1.0, 0.05]])
-    source, listener = np.array([-1.0, -2.0, 1.0]), np.array([[-1.0, 2.0, 1.5]])
-    paths = diffracted_paths(screen, source, listener)
+    source, receiver = np.array([-1.0, -2.0, 1.0]), np.array([[-1.0, 2.0, 1.5]])
+    paths = diffracted_paths(screen, source, receiver)
     plan = 2 * np.hypot(2.0, 1.95) + 0.1
     assert paths.length[0] == pytest.approx(np.hypot(plan, 0.5), abs=0.01)
     assert paths.detour[0] == pytest.approx(paths.length[0] - np.sqrt(16.25), abs=1e-9)
-    corner = np.array([1.0, 0.05]) - listener[0, :2]
+    corner = np.array([1.0, 0.05]) - receiver[0, :2]
     assert paths.arrival[0, :2] / np.hypot(*paths.arrival[0, :2]) == pytest.approx(
         corner / np.hypot(*corner), abs=2e-3
     )
@@ -154,12 +154,12 @@ def test_the_screen_weakens_high_bands_more() -> None:
 
 
 def test_rendered_bands_have_the_energy_of_the_formula() -> None:
-    source, listener = np.array([1.0, 4.0, 1.0]), np.array([[5.5, 4.0, 1.5]])
+    source, receiver = np.array([1.0, 4.0, 1.0]), np.array([[5.5, 4.0, 1.5]])
     plan_walls = walls(three_rooms())
-    first = render_direct_paths(plan_walls, source, listener, DIFFRACTION)
-    paths = find_paths("diffraction", plan_walls, source, listener)
+    first = render_direct_paths(plan_walls, source, receiver, DIFFRACTION)
+    paths = find_paths("diffraction", plan_walls, source, receiver)
     wanted = band_energies(paths)[0]
-    free = render_direct_paths(NO_WALLS, listener[0] + 2 * paths.arrival[0], listener, RESONANCE)
+    free = render_direct_paths(NO_WALLS, receiver[0] + 2 * paths.arrival[0], receiver, RESONANCE)
     # Against the same direction in the open only the loss is left.
     spectra = [np.abs(np.fft.rfft(responses(f)[0, 3, 0], 16000)) for f in (first, free)]
     loss = (spectra[0] / spectra[1])[[250, 500, 1000, 2000, 4000]] ** 2 / (4 * np.pi * 4)
@@ -168,9 +168,9 @@ def test_rendered_bands_have_the_energy_of_the_formula() -> None:
 
 def test_walls_in_sight_change_nothing() -> None:
     plan_walls = walls(three_rooms())
-    source, listeners = np.array([1.0, 1.0, 1.0]), np.array([[2.0, 4.0, 1.5], [5.0, 1.0, 1.5]])
-    one = find_paths("diffraction", plan_walls, source, listeners)
-    other = find_paths("transmission", plan_walls, source, listeners)
+    source, receivers = np.array([1.0, 1.0, 1.0]), np.array([[2.0, 4.0, 1.5], [5.0, 1.0, 1.5]])
+    one = find_paths("diffraction", plan_walls, source, receivers)
+    other = find_paths("transmission", plan_walls, source, receivers)
     assert not one.bent.any()
     assert np.array_equal(one.length, other.length)
     assert np.array_equal(one.arrival, other.arrival)
@@ -185,8 +185,8 @@ def test_lines_that_graze_a_wall_see_and_lines_through_it_do_not() -> None:
 
 def test_a_closed_room_lets_no_first_arrival_in() -> None:
     box = np.array([[2, 2, 4, 2.1], [2, 3.9, 4, 4], [2, 2, 2.1, 4], [3.9, 2, 4, 4]], dtype=float)
-    listeners = np.array([[3.0, 3.0, 1.5], [1.0, 5.0, 1.5]])
-    first = render_direct_paths(box, np.array([0.0, 0.0, 1.0]), listeners, DIFFRACTION)
+    receivers = np.array([[3.0, 3.0, 1.5], [1.0, 5.0, 1.5]])
+    first = render_direct_paths(box, np.array([0.0, 0.0, 1.0]), receivers, DIFFRACTION)
     assert first.scale[0] == 0
     assert not first.samples[0].any()
     assert first.scale[1] > 0
@@ -197,11 +197,11 @@ def test_level_falls_with_the_way_to_walk() -> None:
     plan = three_rooms()
     grid = build_grid(plan)
     source_cell = int(np.flatnonzero((grid.lattice == [2, 8]).all(axis=1))[0])
-    ears = np.column_stack([grid.centres, np.full(len(grid.centres), 1.5)])
+    receivers = np.column_stack([grid.centres, np.full(len(grid.centres), 1.5)])
     source = np.array([1.0, 4.0, 1.0])
     config = AcousticsConfig(name="diffraction", direct_path="diffraction", rays=3000, seconds=0.3)
-    tail = render_source(build_surfaces(plan), source, ears, config)
-    whole = combine(tail, render_direct_paths(walls(plan), source, ears, config))
+    reverberation = render_source(build_surfaces(plan), source, receivers, config)
+    whole = combine(reverberation, render_direct_paths(walls(plan), source, receivers, config))
     level = 10 * np.log10((whole**2).sum(axis=(1, 2, 3)))
     way = grid.distances[source_cell]
     assert spearmanr(level, way).statistic < -0.9

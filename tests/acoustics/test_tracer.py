@@ -7,7 +7,7 @@ from avn.acoustics.decay import reverberation_time, schroeder
 from avn.acoustics.kernels import nearest_hit
 from avn.acoustics.materials import SPEED_OF_SOUND, absorption, air_attenuation
 from avn.acoustics.population import Rays, even_out
-from avn.acoustics.tracer import Events, _sorted_room, fibonacci_directions, trace
+from avn.acoustics.tracer import Events, _sort_surfaces, fibonacci_directions, trace
 from avn.apartments.floor_plan import Doorway, FloorPlan, Room
 from avn.apartments.surfaces import Surfaces, build_surfaces, shoebox
 
@@ -33,7 +33,7 @@ def eyring(size: tuple[float, ...], absorbed: float, air: float = 0.0) -> float:
 
 def kuttruff(size: tuple[float, ...], absorbed: float) -> float:
     """Eyring's time with the variance of the free paths taken into account."""
-    room = _sorted_room(shoebox(size, "plaster"), None, None)
+    room = _sort_surfaces(shoebox(size, "plaster"), None, None)
     random = np.random.default_rng(0)
     # Lambert reflections from points spread over the walls are what a diffuse field is.
     lengths, point, heading = [], np.array(size) / 2.1, np.array([0.6, 0.64, 0.48])
@@ -90,10 +90,10 @@ def test_air_shortens_the_high_bands() -> None:
 
 @pytest.mark.parametrize(("absorbed", "scattered"), [(0.2, 0.4), (0.1, 0.1), (0.5, 1.0)])
 def test_reverberation_time_agrees_with_pyroomacoustics(absorbed: float, scattered: float) -> None:
-    listeners = places(ROOM, 4, seed=3)
+    receivers = places(ROOM, 4, seed=3)
     seconds = 1.3 * eyring(ROOM, absorbed)
     events = trace(
-        shoebox(ROOM, "plaster"), SOURCE, listeners, rays=15000, seconds=seconds,
+        shoebox(ROOM, "plaster"), SOURCE, receivers, rays=15000, seconds=seconds,
         absorption=flat(absorbed), scattering=flat(scattered), air=False,
     )  # fmt: skip
     ours = [reverberation_time(h, 0.001) for h in events.histogram()[:, :, 3]]
@@ -103,7 +103,7 @@ def test_reverberation_time_agrees_with_pyroomacoustics(absorbed: float, scatter
     )
     room.set_ray_tracing(n_rays=6000, receiver_radius=0.25, energy_thres=1e-7)
     room.add_source(SOURCE)
-    room.add_microphone_array(listeners.T)
+    room.add_microphone_array(receivers.T)
     room.compute_rir()
     theirs = [reverberation_time(rir[0] ** 2, 1 / 16000) for rir in room.rir]
     assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.15)
@@ -112,21 +112,21 @@ def test_reverberation_time_agrees_with_pyroomacoustics(absorbed: float, scatter
 def test_a_mirror_adds_the_energy_of_the_image_source() -> None:
     floor = shoebox((40.0, 40.0, 30.0), "plaster")
     only = Surfaces(*(getattr(floor, name)[4:5] for name in _ARRAYS), floor.materials)
-    source, listeners = np.array([20, 20, 1.5]), np.array([[22, 20, 1.5], [20, 23.5, 2.0]])
+    source, receivers = np.array([20, 20, 1.5]), np.array([[22, 20, 1.5], [20, 23.5, 2.0]])
     events = trace(
-        only, source, listeners, rays=400000, seconds=0.1, radius=0.3,
+        only, source, receivers, rays=400000, seconds=0.1, radius=0.3,
         absorption=flat(0.25), scattering=flat(0.0), air=False,
     )  # fmt: skip
-    image = np.linalg.norm(listeners - [20, 20, -1.5], axis=1)
+    image = np.linalg.norm(receivers - [20, 20, -1.5], axis=1)
     energy = events.histogram().sum(axis=1)[:, 0]
     assert energy == pytest.approx(0.75 / (4 * np.pi * image**2), rel=0.05)
-    for person, way in enumerate(image):
-        own = events.listener() == person
+    for receiver, way in enumerate(image):
+        own = events.receiver() == receiver
         # A chord that ends a step of the way comes in two parts.
         assert events.distance[own] == pytest.approx(way, abs=0.3)
         heard = np.average(events.distance[own], weights=events.energy[own, 0])
         assert heard == pytest.approx(way, abs=0.02)
-        below = np.array([20, 20, -1.5]) - listeners[person]
+        below = np.array([20, 20, -1.5]) - receivers[receiver]
         assert (events.arrival[own] @ below / way > 0.99).all()
 
 
@@ -138,9 +138,9 @@ def test_listeners_do_not_disturb_one_another() -> None:
     surfaces = shoebox(ROOM, "plaster")
     crowd = np.concatenate([places(ROOM, 30), places(ROOM, 5) + 0.1])
     together = trace(surfaces, SOURCE, crowd, rays=500, seconds=0.2).histogram()
-    for person in (0, 17, 34):
-        alone = trace(surfaces, SOURCE, crowd[[person]], rays=500, seconds=0.2).histogram()
-        assert alone[0] == pytest.approx(together[person], rel=1e-6)
+    for receiver in (0, 17, 34):
+        alone = trace(surfaces, SOURCE, crowd[[receiver]], rays=500, seconds=0.2).histogram()
+        assert alone[0] == pytest.approx(together[receiver], rel=1e-6)
         assert alone.sum() > 0
 
 
@@ -148,8 +148,8 @@ def test_exchanging_source_and_listener_keeps_the_energy() -> None:
     surfaces = three_rooms()
     one, other = np.array([1.0, 1.0, 1.0]), np.array([4.5, 3.0, 1.5])
 
-    def heard(source: NDArray, listener: NDArray) -> NDArray:
-        events = trace(surfaces, source, listener[None], rays=20000, seconds=0.6)
+    def heard(source: NDArray, receiver: NDArray) -> NDArray:
+        events = trace(surfaces, source, receiver[None], rays=20000, seconds=0.6)
         return 10 * np.log10(events.histogram()[0].sum(axis=0))
 
     assert heard(one, other) == pytest.approx(heard(other, one), abs=1.0)
@@ -177,14 +177,14 @@ def test_two_coupled_rooms_show_a_double_slope() -> None:
     surfaces = build_surfaces(FloorPlan("coupled", rooms, (Doorway(4, 2, "y"),)))
     dead = ("carpet", "plaster", "ceiling_plaster")
     coefficients = np.array([[0.5 if n in dead else 0.03] * 6 for n in surfaces.materials])
-    listeners = np.array([[x, y, 1.5] for x in (1.0, 2.0, 3.0) for y in (1.0, 2.0, 3.0)])
+    receivers = np.array([[x, y, 1.5] for x in (1.0, 2.0, 3.0) for y in (1.0, 2.0, 3.0)])
     common = {"rays": 20000, "seconds": 1.2, "depth": 600, "air": False}
     source = np.array([1.5, 1.5, 1.0])
-    coupled = trace(surfaces, source, listeners, absorption=coefficients, **common)
+    coupled = trace(surfaces, source, receivers, absorption=coefficients, **common)
     early, late = slopes(coupled.histogram().sum(axis=0)[:, 3])
     assert late > 2 * early
     alone = trace(
-        shoebox((4.0, 4.0, 2.6), "plaster"), source, listeners,
+        shoebox((4.0, 4.0, 2.6), "plaster"), source, receivers,
         absorption=flat(0.5), scattering=flat(0.5), **common,
     )  # fmt: skip
     early, late = slopes(alone.histogram().sum(axis=0)[:, 3])
@@ -195,10 +195,10 @@ def test_no_ray_escapes_from_an_apartment() -> None:
     """With nothing swallowed, all energy stays: the level does not fall."""
     surfaces = three_rooms()
     nothing = np.zeros((len(surfaces.materials), 6))
-    listeners = np.array([[x, y, 1.5] for x in np.arange(0.5, 9, 0.5) for y in (1.0, 2.0, 3.0)])
-    listeners = listeners[(listeners[:, 0] % 3) != 0]
+    receivers = np.array([[x, y, 1.5] for x in np.arange(0.5, 9, 0.5) for y in (1.0, 2.0, 3.0)])
+    receivers = receivers[(receivers[:, 0] % 3) != 0]
     events = trace(
-        surfaces, np.array([1.0, 1.0, 1.0]), listeners, rays=4000, seconds=2.0, depth=5000,
+        surfaces, np.array([1.0, 1.0, 1.0]), receivers, rays=4000, seconds=2.0, depth=5000,
         absorption=nothing, air=False,
     )  # fmt: skip
     energy = events.histogram(0.5)[:, :, 0].mean(axis=0)
@@ -206,9 +206,9 @@ def test_no_ray_escapes_from_an_apartment() -> None:
 
 
 def test_equal_seeds_give_equal_bytes_and_other_seeds_others() -> None:
-    surfaces, listeners = three_rooms(), places((3.0, 4.0, 2.6), 5)
+    surfaces, receivers = three_rooms(), places((3.0, 4.0, 2.6), 5)
     one, two, other = (
-        trace(surfaces, SOURCE, listeners, rays=500, seconds=0.2, seed=seed) for seed in (1, 1, 2)
+        trace(surfaces, SOURCE, receivers, rays=500, seconds=0.2, seed=seed) for seed in (1, 1, 2)
     )
     for name in ("starts", "distance", "energy", "arrival", "sign"):
         assert getattr(one, name).tobytes() == getattr(two, name).tobytes()
@@ -236,9 +236,9 @@ def test_evening_out_keeps_the_energy_of_every_place() -> None:
 
 def test_late_sound_in_a_far_room_is_steady() -> None:
     """Other seeds give another response and hardly another level."""
-    listeners = np.array([[8.0, y, 1.5] for y in (1.0, 2.0, 3.0)])
+    receivers = np.array([[8.0, y, 1.5] for y in (1.0, 2.0, 3.0)])
     late = [
-        trace(three_rooms(), np.array([1.0, 1.0, 1.0]), listeners, rays=4000, seed=seed)
+        trace(three_rooms(), np.array([1.0, 1.0, 1.0]), receivers, rays=4000, seed=seed)
         .histogram()[:, 150:300]
         .sum(axis=(1, 2))
         for seed in range(5)
@@ -247,9 +247,9 @@ def test_late_sound_in_a_far_room_is_steady() -> None:
 
 
 def test_more_rays_change_the_noise_and_not_the_level() -> None:
-    surfaces, listeners = three_rooms(), places((3.0, 4.0, 2.6), 40)
+    surfaces, receivers = three_rooms(), places((3.0, 4.0, 2.6), 40)
     few, many = (
-        trace(surfaces, SOURCE, listeners, rays=rays, seconds=0.3).histogram().sum(axis=1)
+        trace(surfaces, SOURCE, receivers, rays=rays, seconds=0.3).histogram().sum(axis=1)
         for rays in (2000, 16000)
     )
     assert 10 * np.log10(few.mean(axis=0) / many.mean(axis=0)) == pytest.approx(

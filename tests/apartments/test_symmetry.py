@@ -10,7 +10,7 @@ import pytest
 from avn.apartments.floor_plan import Doorway, FloorPlan
 from avn.apartments.generator import generate
 from avn.apartments.splits import SplitConfig, load_split
-from avn.apartments.symmetry import layout_key, likeness
+from avn.apartments.symmetry import layout_key, layout_similarity
 
 
 def turned(plan: FloorPlan, turn: int) -> FloorPlan:
@@ -37,7 +37,7 @@ def turned(plan: FloorPlan, turn: int) -> FloorPlan:
 def test_copies_have_one_key(turn: int) -> None:
     plan = generate(5, "home")
     assert layout_key(turned(plan, turn)) == layout_key(plan)
-    assert likeness(turned(plan, turn), plan) == 1.0
+    assert layout_similarity(turned(plan, turn), plan) == 1.0
 
 
 def test_other_layouts_have_another_key() -> None:
@@ -61,10 +61,10 @@ def test_likeness_sees_what_differs() -> None:
     squares = [round(4 * (r.x1 - r.x0 - 0.5) * (r.y1 - r.y0 - 0.5)) for r in plan.rooms]
     # All but the first room is the same.
     expected = 1 - squares[0] / (sum(squares) + len(plan.doorways))
-    assert likeness(plan, repainted) == pytest.approx(expected, abs=0.03)
+    assert layout_similarity(plan, repainted) == pytest.approx(expected, abs=0.03)
 
 
 def test_no_two_frozen_apartments_look_alike() -> None:
     plans = list(chain(*load_split(SplitConfig(folder="var")).values()))
     assert len(plans) == 10
-    assert max(likeness(a, b) for a, b in combinations(plans, 2)) <= 0.7
+    assert max(layout_similarity(a, b) for a, b in combinations(plans, 2)) <= 0.7

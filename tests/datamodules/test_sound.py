@@ -5,7 +5,8 @@ from synthetic_scene import synthetic_scene, synthetic_sounds
 
 from avn.acoustics.microphone import Microphone
 from avn.core.errors import UserError
-from avn.datamodules.sound import ClipSampler, ClipSet, SoundData
+from avn.datamodules.clip_set import ClipSet
+from avn.datamodules.sound import ClipSampler, SoundData
 from avn.dataset.source_locations import relative_locations
 
 

@@ -26,13 +26,15 @@ def plan():
 def sounded(plan, folder, processes=1):
     """The apartment in both regimes, made in a folder."""
     scene = opened(plan, FEW, folder)
-    tail = scene.folder / "tail.h5"
-    build.build_reverberation([(scene, tail, "t")], FEW, processes)
+    reverberation = scene.folder / "tail.h5"
+    build.build_reverberation([(scene, reverberation, "t")], FEW, processes)
     regimes = []
     for name, acoustics in (("resonance", FEW), ("diffraction", ROUND)):
-        first = scene.folder / f"{name}.h5"
-        build.build_direct_sound(scene, acoustics, first, name)
-        brirs = Brirs((tail, "t"), (first, name), len(scene.sources), scene.grid.cells)
+        direct_path = scene.folder / f"{name}.h5"
+        build.build_direct_sound(scene, acoustics, direct_path, name)
+        brirs = Brirs(
+            (reverberation, "t"), (direct_path, name), len(scene.sources), scene.grid.cells
+        )
         regimes.append(scene.with_brirs(brirs))
     return regimes
 
@@ -76,11 +78,11 @@ def test_a_killed_run_goes_on_where_it_was(plan, made, tmp_path, monkeypatch):
 def test_what_is_gathered_is_what_was_rendered(plan, made):
     scene = made[1]
     brirs, grid, config = scene.brirs, scene.grid, ROUND
-    ears = np.column_stack([grid.centres, np.full(grid.cells, config.receiver_height)])
+    receivers = np.column_stack([grid.centres, np.full(grid.cells, config.receiver_height)])
     source = np.array([*grid.centres[scene.sources[1]], config.source_height])
-    tail = brir.render_source(build_surfaces(plan), source, ears, config)
-    first = brir.render_direct_paths(walls(plan), source, ears, config)
-    whole = brir.combine(tail, first)
+    reverberation = brir.render_source(build_surfaces(plan), source, receivers, config)
+    direct_path = brir.render_direct_paths(walls(plan), source, receivers, config)
+    whole = brir.combine(reverberation, direct_path)
     cells = torch.tensor([0, 5, grid.cells - 1])
     for heading in range(4):
         found = brirs.gather(torch.tensor([1, 1, 1]), 4 * cells + heading)
@@ -97,12 +99,12 @@ def test_the_regimes_share_the_tail_and_differ_in_the_first_arrival(made):
 
 
 def test_responses_of_another_making_are_refused(made):
-    tail, first = (made[0].folder / name for name in ("tail.h5", "resonance.h5"))
+    reverberation, direct_path = (made[0].folder / name for name in ("tail.h5", "resonance.h5"))
     pairs = len(made[0].sources), made[0].grid.cells
     with pytest.raises(UserError, match="another floor plan or other settings"):
-        Brirs((tail, "another"), (first, "resonance"), *pairs)
+        Brirs((reverberation, "another"), (direct_path, "resonance"), *pairs)
     with pytest.raises(UserError, match=r"resonance\.h5: made from another"):
-        Brirs((tail, "t"), (first, "diffraction"), *pairs)
+        Brirs((reverberation, "t"), (direct_path, "diffraction"), *pairs)
 
 
 def test_geometry_is_what_the_plan_says(plan, made):

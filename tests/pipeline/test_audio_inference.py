@@ -6,7 +6,7 @@ from synthetic_scene import synthetic_scene, synthetic_sounds
 
 from avn.acoustics.microphone import Microphone
 from avn.core.classes import build_object
-from avn.datamodules.sound import ClipSet
+from avn.datamodules.clip_set import ClipSet
 from avn.modules.sound_cnn import SoundCnn
 from avn.pipeline.audio_inference import hear, sound_errors
 

@@ -1,0 +1,1 @@
+"""Room acoustics: ray tracing, binaural room impulse responses and audio clips."""

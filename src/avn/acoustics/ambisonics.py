@@ -1,7 +1,7 @@
-"""Third-order ambisonics: real spherical harmonics and their turning about the vertical.
+"""Third-order ambisonics: real spherical harmonics and their rotation about the vertical.
 
 Channels are in ACN order (channel l*l + l + m) with SN3D weights and without the Condon-Shortley
-phase, as the AmbiX format has them. The ambisonic axes are x to the front, y to the left and z up.
+phase, as in the AmbiX format. The ambisonic axes are x to the front, y to the left and z up.
 In the world frame of an apartment the front is north: x = +y of the world, y = -x of the world.
 """
 
@@ -20,12 +20,12 @@ _QUARTER_TURN_COSINES = (1.0, 0.0, -1.0, 0.0)
 
 
 def sh(directions: ArrayLike) -> NDArray[np.float64]:
-    """Real spherical harmonics of directions, in the frame of a listener that faces north.
+    """Compute the real spherical harmonics of directions, in the frame of a head facing north.
 
     Parameters
     ----------
     directions : array, shape (..., 3)
-        Unit vectors from the listener to the sound, in world axes (x east, y north, z up).
+        Unit vectors from the receiver to the sound, in world axes (x east, y north, z up).
 
     Returns
     -------
@@ -61,7 +61,7 @@ def sh(directions: ArrayLike) -> NDArray[np.float64]:
 
 
 def rotation_to_heading(heading: int) -> NDArray[np.float64]:
-    """Matrix that takes channels from the world-north frame to that of an agent's heading.
+    """Return the matrix that rotates channels from the world frame to an agent's heading.
 
     Parameters
     ----------
@@ -71,10 +71,10 @@ def rotation_to_heading(heading: int) -> NDArray[np.float64]:
     Returns
     -------
     array, shape (16, 16)
-        ``sh_of_agent = matrix @ sh_of_world``. An agent that turns clockwise by an angle finds
-        every sound at an azimuth that is larger by it (azimuths count to the left), so channels
-        of degrees m and -m mix by the cosine and sine of m times the angle. For quarter turns
-        all entries are exactly 0, 1 or -1.
+        ``sh_of_agent = matrix @ sh_of_world``. A clockwise turn of the agent increases the azimuth
+        of every sound by the same angle (azimuths count to the left), so channels of degrees m and
+        -m mix by the cosine and sine of m times the angle. For quarter turns all entries are
+        exactly 0, 1 or -1.
     """
     matrix = np.zeros((CHANNELS, CHANNELS))
     for channel, degree in enumerate(DEGREES):

@@ -1,28 +1,28 @@
-"""Whether an audio file was cut short, for the formats whose reader does not say so.
+"""Detection of truncated audio files, for the formats whose reader does not report it.
 
-libsndfile shortens WAV and AIFF files silently to what is there and takes the last whole page of an
-OGG stream for its end, so their headers are read here.
+libsndfile silently shortens truncated WAV and AIFF files and takes the last whole page of an OGG
+stream for its end, so their headers are read here.
 """
 
 import struct
 
-STREAMED = (0, 0xFFFFFFFF)  # sizes that a program writes which cannot go back to the header
+STREAMED = (0, 0xFFFFFFFF)  # sizes written by programs that cannot seek back to the header
 OGG_PAGE = 27  # bytes of a page header before its segment table
 OGG_END = 0x04
 
 
 def missing_part(content: bytes) -> str | None:
-    """What a truncated audio file lacks.
+    """Describe the missing part of a truncated audio file.
 
     Parameters
     ----------
     content : bytes
-        The whole file.
+        Content of the file.
 
     Returns
     -------
     str or None
-        A few words, or None where nothing is known to be missing.
+        A phrase for an error message; None if nothing is known to be missing.
     """
     if content[:4] == b"RIFF" and content[8:12] == b"WAVE":
         return _missing_chunk(content, b"data", "<I")
@@ -34,7 +34,7 @@ def missing_part(content: bytes) -> str | None:
 
 
 def _missing_chunk(content: bytes, sound: bytes, size_format: str) -> str | None:
-    """Walk the chunks of a RIFF or AIFF file up to the one that holds the samples."""
+    """Read the chunks of a RIFF or AIFF file up to the one of the samples."""
     place = 12
     while place + 8 <= len(content):
         name = content[place : place + 4]
@@ -49,7 +49,7 @@ def _missing_chunk(content: bytes, sound: bytes, size_format: str) -> str | None
 
 
 def _missing_page(content: bytes) -> str | None:
-    """Look whether the last page of an OGG stream is whole and marked as the last."""
+    """Check that the last page of an OGG stream is whole and marked as the last."""
     last = content.rfind(b"OggS")
     segments_at = last + OGG_PAGE
     if segments_at <= len(content):

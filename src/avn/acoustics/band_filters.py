@@ -1,7 +1,7 @@
-"""From energies in six octave bands to samples.
+"""Octave-band filters.
 
-The bands overlap so that their amplitudes sum to one at every frequency: what has equal energy in
-all bands, like the echo of a flat surface, stays a single sample. The lowest band reaches down to
+The bands overlap so that their amplitudes sum to one at every frequency: an event of equal energy
+in all bands, like the echo of a flat surface, is a single sample. The lowest band reaches down to
 0 Hz and the highest up to half the sampling rate.
 """
 
@@ -13,15 +13,20 @@ from numpy.typing import NDArray
 from avn.acoustics.materials import BANDS
 
 HALF_SECONDS = 0.01  # on either side of the middle of a band filter
-_GRID_SECONDS = 0.256  # of the spectra from which filters are made
-_KAISER = 3.0  # shape of the window: a compromise of edge and ripple
+_GRID_SECONDS = 0.256  # least period of the spectra from which filters are designed
+_KAISER = 3.0  # beta of the Kaiser window: a compromise of transition width and ripple
 
 
 def band_weights(frequencies: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Amplitude of each band at given frequencies, shape (6, ...); sums to 1 over bands.
+    """Compute each band's amplitude at given frequencies, shape (6, ...); bands sum to 1.
 
-    Between two neighbouring centres the amplitude crosses over as a raised cosine of the logarithm
-    of frequency.
+    Between the centres of two neighbouring bands the amplitudes are raised cosines of the
+    logarithm of frequency.
+
+    Parameters
+    ----------
+    frequencies : array
+        In Hz.
     """
     low, high = np.log2(BANDS[0]), np.log2(BANDS[-1])
     octave = np.clip(np.log2(np.maximum(frequencies, 1e-3)), low, high) - low
@@ -31,18 +36,28 @@ def band_weights(frequencies: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def half_length(rate: int) -> int:
-    """Samples on either side of the middle of a band filter at a sampling rate."""
+    """Return the samples on either side of the middle of a band filter, at a rate in Hz."""
     return round(HALF_SECONDS * rate)
 
 
 def _grid(rate: int) -> int:
-    """Points of the spectra from which filters are made, a power of 2."""
+    """Return the length of the transform from which filters are designed, a power of 2."""
     return 1 << (round(_GRID_SECONDS * rate) - 1).bit_length()
 
 
 @lru_cache(maxsize=4)
 def band_firs(rate: int) -> NDArray[np.float32]:
-    """Symmetric filters of the bands, (6, 2 `half_length` + 1); they sum to a unit impulse."""
+    """Design the bands' symmetric filters; they sum to a unit impulse.
+
+    Parameters
+    ----------
+    rate : int
+        Sampling rate in Hz.
+
+    Returns
+    -------
+    float32 array, shape (6, 2 `half_length(rate)` + 1)
+    """
     spectrum = band_weights(np.fft.rfftfreq(_grid(rate), 1 / rate))
     response = np.fft.fftshift(np.fft.irfft(spectrum, axis=1), axes=1)
     middle, half = _grid(rate) // 2, half_length(rate)
@@ -53,7 +68,7 @@ def band_firs(rate: int) -> NDArray[np.float32]:
 
 
 def minimum_phase(gains: NDArray[np.float64], rate: int, taps: int) -> NDArray[np.float64]:
-    """Causal filters with the given amplitude in each band.
+    """Design minimum-phase filters with the given amplitude in each band.
 
     Parameters
     ----------
@@ -65,8 +80,8 @@ def minimum_phase(gains: NDArray[np.float64], rate: int, taps: int) -> NDArray[n
     Returns
     -------
     array, shape (N, taps)
-        Nothing sounds before its time: sample 0 is the start. Made by folding the cepstrum
-        (Oppenheim and Schafer, *Discrete-Time Signal Processing*, section 13.8).
+        Causal; made by folding the cepstrum (Oppenheim and Schafer, *Discrete-Time Signal
+        Processing*, section 13.8).
     """
     grid = _grid(rate)
     weights = band_weights(np.fft.rfftfreq(grid, 1 / rate))

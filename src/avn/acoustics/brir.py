@@ -1,7 +1,7 @@
-"""Binaural room impulse responses of one source: reverberation and first arrival.
+"""Binaural room impulse responses of one source: reverberation and direct path.
 
-The response of listener l in heading h is ``tail[l, h] * scale[l]`` with the first arrival added
-from its onset on. Both hold the time of flight.
+The response of receiver l in heading h is ``samples[l, h] * scale[l]`` of the reverberation, plus
+the direct path from its onset on. Both contain the time of flight.
 """
 
 import hashlib
@@ -29,23 +29,23 @@ class AcousticsConfig:
     name : str
         Name of the regime, as files and tables have it.
     direct_path : {"transmission", "diffraction"}
-        How the direct path gets to the listener: through walls, or round them.
+        Direct path where a wall blocks the line of sight: through walls, or round their corners.
     seconds : float
         Length of the impulse responses.
     rate : int
-        Samples a second, of impulse responses, of clips and of what networks hear.
+        Sampling rate of impulse responses, clips and the inputs of networks, Hz.
     rays : int
-        Rays from each source.
+        Number of rays from each source.
     depth : int
-        Reflections of a ray at most; time and loss end most of them before.
+        Largest number of reflections of a ray; time and loss end most rays before.
     receiver_radius : float
-        Metres; a ray that passes so near to the ears is heard.
+        Radius of the spheres that receive rays, metres.
     receiver_height, source_height : float
         Metres above the floor.
     air : bool
-        Whether air absorbs.
+        True for absorption by air.
     seed : int
-        Draws the directions of the rays.
+        Seed of the ray tracing.
     """
 
     name: str = "resonance"
@@ -61,12 +61,25 @@ class AcousticsConfig:
     seed: int = 0
 
 
-# What the names of the two regimes mean, wherever they stand.
+# Direct path of the regimes of these names.
 REGIME_OF = {"resonance": "transmission", "diffraction": "diffraction"}
 
 
 def check_config(config: AcousticsConfig, node: str = "acoustics") -> AcousticsConfig:
-    """The config itself, or a `UserError` that names the key below `node` and what it may be."""
+    """Check a config and return it.
+
+    Parameters
+    ----------
+    config : AcousticsConfig
+        Settings.
+    node : str
+        Name of the config's node, for messages.
+
+    Raises
+    ------
+    UserError
+        If a value is out of range; the message names the key below `node` and the valid values.
+    """
     if config.direct_path not in REGIMES:
         raise UserError(
             f"{node}.direct_path: '{config.direct_path}' is not known; use {' or '.join(REGIMES)}"
@@ -94,18 +107,18 @@ def check_config(config: AcousticsConfig, node: str = "acoustics") -> AcousticsC
 
 
 @dataclass(frozen=True)
-class Tail:
-    """The reverberation that L listeners hear of one source.
+class Reverberation:
+    """Reverberation (all reflections) of one source at L receivers.
 
     Attributes
     ----------
     samples : (L, 4, 2, T) int16
-        Heading, ear (0 left, 1 right), sample; x `scale` is the response.
+        Heading, ear (0 left, 1 right), sample; `samples * scale` is the response.
     scale : (L,) float32
         0 where nothing arrives.
     cut_db : (L,) float32
-        Energy of the reverberation that comes after T samples, in dB of all of it; measured on
-        rays that go on for half as long again. -inf where none came.
+        Energy of the reverberation after T samples, in dB of all of it, measured on rays that
+        are followed for 1.5 times as long; -inf where there is none.
     """
 
     samples: NDArray[np.int16]
@@ -115,7 +128,7 @@ class Tail:
 
 @lru_cache(maxsize=4)
 def head_filters(rate: int) -> NDArray[np.float32]:
-    """The filters of the shipped heads, (4, 2, 16, taps), made once for each rate."""
+    """Return the binaural filters of the packaged HRIRs, (4, 2, 16, taps), cached by rate."""
     return load_sh_hrirs().filters(rate)
 
 
@@ -125,7 +138,7 @@ def _binaural(rate: int, samples: int) -> Binaural:
 
 
 def assets_hash() -> str:
-    """Hash of the tables that shape responses beside the config: materials and HRIRs."""
+    """Compute a hash of the tables that responses depend on: materials and HRIRs."""
     tables = (materials.absorption(materials.NAMES), materials.scattering(materials.NAMES))
     content = hashlib.sha256(repr(materials.NAMES).encode())
     for table in (*tables, load_sh_hrirs().left):
@@ -134,14 +147,14 @@ def assets_hash() -> str:
 
 
 def cut_off_energy(events: Events) -> NDArray[np.float32]:
-    """Energy after `events.seconds` in dB of all energy, shape (L,), summed over the bands."""
+    """Compute the energy after `events.seconds` in dB of all, shape (L,), summed over bands."""
     late = events.distance >= events.seconds * materials.SPEED_OF_SOUND
     energy = events.energy.sum(axis=1, dtype=np.float64)
-    people = len(events.starts) - 1
-    who = events.listener()
-    total = np.bincount(who, weights=energy, minlength=people)
-    after = np.bincount(who[late], weights=energy[late], minlength=people)
-    share = np.divide(after, total, out=np.zeros(people), where=total > 0)
+    receiver_count = len(events.starts) - 1
+    receiver = events.receiver()
+    total = np.bincount(receiver, weights=energy, minlength=receiver_count)
+    after = np.bincount(receiver[late], weights=energy[late], minlength=receiver_count)
+    share = np.divide(after, total, out=np.zeros(receiver_count), where=total > 0)
     with np.errstate(divide="ignore"):
         return (10 * np.log10(share)).astype(np.float32)
 
@@ -149,31 +162,33 @@ def cut_off_energy(events: Events) -> NDArray[np.float32]:
 def render_source(
     surfaces: Surfaces,
     source: NDArray[np.float64],
-    listeners: NDArray[np.float64],
+    receivers: NDArray[np.float64],
     config: AcousticsConfig,
     absorption: NDArray[np.float64] | None = None,
     scattering: NDArray[np.float64] | None = None,
-) -> Tail:
-    """Trace one source and render the reverberation for all listeners.
+) -> Reverberation:
+    """Trace one source and render the reverberation at all receivers.
 
-    Works on one thread; to use more cores, give sources to processes. The bytes depend on the
-    arguments alone.
+    Runs on one thread; to use more cores, distribute sources over processes. The bytes depend on
+    the arguments alone.
 
     Parameters
     ----------
     surfaces : Surfaces
+        Reflecting rectangles of the scene.
     source : array, shape (3,)
-        Metres.
-    listeners : array, shape (L, 3)
-        Where the middle of the head is, metres.
+        Position, metres.
+    receivers : array, shape (L, 3)
+        Positions of the head's centre, metres.
     config : AcousticsConfig
+        Settings.
     absorption, scattering : array, shape (len(surfaces.materials), 6), optional
-        Coefficients in place of those of the materials' names.
+        Coefficients in place of those of `avn.acoustics.materials`.
     """
     events = trace(
         surfaces,
         source,
-        listeners,
+        receivers,
         rays=config.rays,
         depth=config.depth,
         seconds=config.seconds,
@@ -185,37 +200,37 @@ def render_source(
     )
     binaural = _binaural(config.rate, round(config.seconds * config.rate))
     samples, scale = binaural_responses(events, binaural, config.rate)
-    return Tail(samples, scale, cut_off_energy(events))
+    return Reverberation(samples, scale, cut_off_energy(events))
 
 
 def render_direct_paths(
     walls: NDArray[np.float64],
     source: NDArray[np.float64],
-    listeners: NDArray[np.float64],
+    receivers: NDArray[np.float64],
     config: AcousticsConfig,
 ) -> DirectPaths:
-    """Render the first arrivals of one source at all listeners.
+    """Render the direct paths of one source to all receivers.
 
     Parameters
     ----------
     walls : array, shape (W, 4)
-        `avn.apartments.walls.walls(plan)`; what the sound goes round in `diffraction`.
-    source, listeners, config
+        `avn.apartments.walls.walls(plan)`, metres; obstacles in `diffraction`.
+    source, receivers, config
         As in `render_source`.
     """
-    paths = find_paths(config.direct_path, walls, source, listeners)
-    # One length in a regime, whether or not a source has listeners behind a wall.
+    paths = find_paths(config.direct_path, walls, source, receivers)
+    # One length for all sources of a regime, with or without diffracted paths.
     loss_taps = round(LOSS_SECONDS * config.rate) if config.direct_path == "diffraction" else 1
     return render_paths(paths, head_filters(config.rate), config.rate, loss_taps)
 
 
-def combine(tail: Tail, first: DirectPaths) -> NDArray[np.float32]:
-    """The whole responses, shape (L, 4, 2, T), float32."""
-    responses = tail.samples * tail.scale[:, None, None, None]
-    length, taps = responses.shape[-1], first.samples.shape[-1]
-    for person, onset in enumerate(first.onset):
+def combine(reverberation: Reverberation, direct_path: DirectPaths) -> NDArray[np.float32]:
+    """Add reverberation and direct paths to whole responses, shape (L, 4, 2, T), float32."""
+    responses = reverberation.samples * reverberation.scale[:, None, None, None]
+    length, taps = responses.shape[-1], direct_path.samples.shape[-1]
+    for receiver, onset in enumerate(direct_path.onset):
         kept = max(0, min(taps, length - int(onset)))
-        responses[person, ..., onset : onset + kept] += (
-            first.samples[person, ..., :kept] * first.scale[person]
+        responses[receiver, ..., onset : onset + kept] += (
+            direct_path.samples[receiver, ..., :kept] * direct_path.scale[receiver]
         )
     return responses

@@ -1,11 +1,11 @@
-"""Clips: one second of what two ears hear in the steady state, rendered in batches.
+"""Clips: one second of binaural audio in the steady state, rendered in batches.
 
-A clip is a second of the looped dry sound, at a random place and with a random circular phase, in
-circular convolution with a binaural room impulse response (BRIR), over the noise of a microphone.
-The sound is as if it had been going on for ever: no onset betrays the time of flight.
+A clip is a second of the looped dry sound, from a random position and with a random circular phase,
+circularly convolved with a binaural room impulse response (BRIR), plus the noise of a microphone.
+The sound is in its steady state: it has no onset that would reveal the time of flight.
 
-What is random in a clip is a pure function of integers (seed, purpose, source, state, sound, take),
-by a counter-based hash, so that any clip can be rendered at any time, alone or in any batch.
+All random numbers of a clip are a pure function of integers (seed, purpose, source, state, sound,
+realisation) by a counter-based hash, so any clip can be rendered alone or in any batch.
 """
 
 from collections.abc import Mapping
@@ -28,29 +28,29 @@ from avn.core.files import atomic_write
 
 PURPOSES = ("train", "eval")
 
-FADE_SECONDS = 0.01  # over which the end of a second passes into its beginning
-HOP_SECONDS = 0.01  # grid of the places where a second may begin
+FADE_SECONDS = 0.01  # cross-fade from the end of a second to its beginning
+HOP_SECONDS = 0.01  # grid of the positions at which a second may begin
 LEAST_LEVEL = 0.5  # of the usual level of the sound: -6 dB
-NOISE_SAMPLES = 1 << 19  # 33 s of noise an ear
+NOISE_SAMPLES = 1 << 19  # 33 s of noise for each ear
 EXPORT_FACTOR = 0.1
 
 
 class DrySounds:
-    """A bank of looped dry sounds, from which seconds are cut in batches.
+    """Bank of looped dry sounds, from which seconds are cut in batches.
 
-    A second never begins where it would be much weaker than the sound usually is (half its level):
-    a long recording with pauses is heard, not missed. Each sound is scaled so that the seconds
-    that can be drawn have unit RMS on average. For a steady sound that is the RMS of the
-    recording; one that is mostly silent does not grow louder by its pauses.
+    Seconds of less than half the usual level of the sound are never drawn, so that the pauses of
+    a long recording are left out. Each sound is scaled so that the seconds that can be drawn have
+    unit RMS on average. For a steady sound that is the RMS of the recording; pauses do not
+    raise the level of the rest.
 
     Parameters
     ----------
     sounds : mapping
         Name to float array (n,) with n >= rate, as `load_sounds` gives it.
     device : torch.device or str
-        Device of the bank and of the seconds that are cut.
+        Device of the bank and of the seconds.
     rate : int
-        Sampling rate of the sounds in Hz; a clip is so many samples.
+        Sampling rate of the sounds in Hz; a clip has as many samples.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class DrySounds:
         self._wave = torch.from_numpy(np.concatenate(waves)).to(device)
         self._places = torch.from_numpy(table).to(device)
         self._counts = torch.tensor([len(starts) for starts in places], device=device)
-        # By its name, so that a clip of a sound is the same whichever sounds are beside it.
+        # Keys depend on the name alone, so that clips do not depend on the bank's other sounds.
         keys = [
             int.from_bytes(sha256(name.encode()).digest()[:8], "little", signed=True)
             for name in self.names
@@ -82,6 +82,7 @@ class DrySounds:
         self._fade_in = ramp / (self._fade + 1)
 
     def __len__(self) -> int:
+        """Return the number of sounds."""
         return len(self.names)
 
     def seconds(self, sound: Tensor, place: Tensor, phase: Tensor) -> Tensor:
@@ -92,13 +93,13 @@ class DrySounds:
         sound : int64 tensor, shape (N,)
             Index into ``names``.
         place, phase : int64 tensor, shape (N,)
-            Non-negative random integers, of which remainders decide where in the recording the
-            second begins and by how many samples it is rolled.
+            Non-negative random integers. Their remainders give the position in the recording
+            and the circular shift in samples.
 
         Returns
         -------
         float32 tensor, shape (N, rate)
-            Its last sample leads over into its first: a cross-fade of 10 ms takes the seam away.
+            Continuous at the wrap-around by a cross-fade of 10 ms.
         """
         rate, fade = self.rate, self._fade
         starts = self._places[sound, place % self._counts[sound]]
@@ -111,23 +112,23 @@ class DrySounds:
 
 
 class ClipRenderer:
-    """Renders clips of a bank of sounds, with one microphone, seed and purpose.
+    """Renderer of clips of a bank of sounds, with one microphone, seed and purpose.
 
     Parameters
     ----------
     sounds : DrySounds
         The bank; clips are rendered on its device.
     microphone : Microphone
-        What it records with.
+        Microphones at the ears.
     seed : int
-        Seed of all that is random.
-    purpose : str
-        "train" or "eval": clips of the two are drawn apart.
+        Seed of all random draws.
+    purpose : {"train", "eval"}
+        The two have independent random numbers.
 
     Raises
     ------
     ValueError
-        The purpose is another word.
+        If the purpose is another word.
     """
 
     def __init__(self, sounds: DrySounds, microphone: Microphone, seed: int, purpose: str) -> None:
@@ -136,7 +137,7 @@ class ClipRenderer:
         device = sounds.keys.device
         words = torch.tensor([int(seed), PURPOSES.index(purpose)], device=device)
         self._key = absorb(torch.zeros((), dtype=torch.int64, device=device), words)
-        # One half of the bank for each ear, so that the ears never share a piece of noise.
+        # One half of the noise for each ear, so that the two are independent.
         noise = np.random.default_rng(int(seed) % 2**64).standard_normal((2, NOISE_SAMPLES))
         self._noise = torch.from_numpy(noise.astype(np.float32)).to(device)
 
@@ -151,11 +152,10 @@ class ClipRenderer:
         Parameters
         ----------
         spectra : complex64 tensor, shape (N, 2, rate / 2 + 1)
-            `brir_spectra` of each clip's BRIR; with ``index`` (M, 2, rate / 2 + 1), each
-            used by many.
+            `brir_spectra` of each clip's BRIR; (M, 2, rate / 2 + 1) with ``index``.
         clip : ClipId
-            Which clips. Their sound is an index into the bank's names; all else only enters the
-            draw.
+            Identity of the clips. The sound is an index into the bank's names; the other fields
+            only enter the random numbers.
         index : int64 tensor, shape (N,), optional
             Row of ``spectra`` for each clip.
 
@@ -181,15 +181,15 @@ class ClipRenderer:
 
 
 def brir_spectra(brirs: Tensor, rate: int = RATE) -> Tensor:
-    """Spectra of BRIRs over one second, for `ClipRenderer.render`.
+    """Compute the spectra of BRIRs over one second, for `ClipRenderer.render`.
 
     Parameters
     ----------
     brirs : float32 tensor, shape (N, 2, T)
-        A response longer than a second is folded onto one, which is exact in the steady state of
-        a sound that repeats every second.
+        A response longer than a second is folded to one second, which is exact in the steady
+        state of a sound that repeats every second.
     rate : int
-        Sampling rate in Hz, samples of a clip.
+        Sampling rate in Hz.
 
     Returns
     -------
@@ -209,17 +209,17 @@ def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32], rate: int =
     Parameters
     ----------
     path : str or Path
-        Where to; the folder is made if it is missing. ``~`` is the home directory.
+        The file; its folder is made if it is missing. ``~`` is the home directory.
     clip : array or tensor, shape (2, n)
         Left and right ear. Samples are multiplied by 0.1, the same for every clip, so that levels
-        compare by ear; what is still beyond full scale is clipped.
+        compare; samples beyond full scale are clipped.
     rate : int
         Sampling rate in Hz.
 
     Raises
     ------
     UserError
-        The file cannot be written.
+        If the file cannot be written.
     """
     target = Path(path).expanduser()
     samples = clip.detach().cpu().numpy() if isinstance(clip, Tensor) else np.asarray(clip)
@@ -233,16 +233,16 @@ def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32], rate: int =
 
 
 def fade_samples(rate: int) -> int:
-    """Samples over which one second passes into the next."""
+    """Return the length of the cross-fade in samples at a sampling rate in Hz."""
     return round(FADE_SECONDS * rate)
 
 
 def _prepare(
     samples: NDArray[np.float32], rate: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Loop a sound far enough for any cut, and list where a second may begin.
+    """Loop a sound far enough for any second, and list the positions at which one may begin.
 
-    Returns the scaled wave, longer by a second and a fade, and the places (P,) within it.
+    Returns the scaled wave, longer by a second and a fade, and the positions (P,) within it.
     """
     wave = np.asarray(samples, dtype=np.float64)
     looped = np.resize(wave, len(wave) + rate + fade_samples(rate))
@@ -252,6 +252,6 @@ def _prepare(
     # The usual power is a mean weighted by the power itself: pauses do not count, and the
     # loudest second is never below it.
     usual = (power**2).sum() / power.sum()
-    chosen = power >= LEAST_LEVEL**2 * usual
-    level = np.sqrt(power[chosen].mean())
-    return (looped / level).astype(np.float32), starts[chosen]
+    loud = power >= LEAST_LEVEL**2 * usual
+    level = np.sqrt(power[loud].mean())
+    return (looped / level).astype(np.float32), starts[loud]

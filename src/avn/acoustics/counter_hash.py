@@ -1,4 +1,4 @@
-"""Random integers that are a pure function of integers, for whole batches at once.
+"""Counter-based random integers: a pure function of integers, for whole batches at once.
 
 The generator is splitmix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators",
 OOPSLA 2014), used as a hash of a counter. Torch has no unsigned arithmetic of 64 bits: signed
@@ -14,12 +14,12 @@ _POSITIVE = (1 << 63) - 1
 
 
 def mix(counter: Tensor) -> Tensor:
-    """The n-th output of splitmix64 from state 0.
+    """Return the n-th output of splitmix64 from state 0.
 
     Parameters
     ----------
     counter : int64 tensor, any shape
-        n.
+        The numbers n.
 
     Returns
     -------
@@ -38,9 +38,9 @@ def absorb(key: Tensor, words: Tensor) -> Tensor:
     Parameters
     ----------
     key : int64 tensor, shape (...) or ()
-        Where to start from.
+        Initial key.
     words : int64 tensor, shape (..., W)
-        What the new key stands for; their order counts.
+        Words to hash; their order counts.
 
     Returns
     -------
@@ -52,14 +52,14 @@ def absorb(key: Tensor, words: Tensor) -> Tensor:
 
 
 def integers(key: Tensor, draw: int) -> Tensor:
-    """Random non-negative integers for each key.
+    """Draw a random non-negative integer for each key.
 
     Parameters
     ----------
     key : int64 tensor, any shape
-        As `absorb` gives it.
+        Keys of `absorb`.
     draw : int
-        Which draw of the key it is: 0, 1, 2, ...
+        Number of the draw: 0, 1, 2, ...
 
     Returns
     -------

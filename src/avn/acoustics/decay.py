@@ -1,11 +1,11 @@
-"""How sound dies away: backward integration and reverberation times."""
+"""Energy decay: backward integration and reverberation times."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
 def schroeder(energy: ArrayLike, axis: int = -1) -> NDArray[np.float64]:
-    """Decay curve in dB, 0 at the start: the energy that is still to come.
+    """Compute the energy decay curve in dB, 0 at the start, by backward integration.
 
     M. R. Schroeder, "New method of measuring reverberation time", JASA 37, 1965.
 
@@ -26,7 +26,7 @@ def schroeder(energy: ArrayLike, axis: int = -1) -> NDArray[np.float64]:
 def reverberation_time(
     energy: ArrayLike, step: float, start: float = -5.0, stop: float = -35.0
 ) -> float:
-    """Time in which sound falls by 60 dB, from a line through a part of the decay curve.
+    """Estimate the reverberation time (decay by 60 dB) by a line fit to the decay curve.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def reverberation_time(
     step : float
         Seconds from one entry to the next.
     start, stop : float
-        The part of the curve that is used, in dB (ISO 3382-2: -5 to -25 is T20, to -35 is T30).
+        Part of the curve to fit, in dB (ISO 3382-2: -5 to -25 is T20, -5 to -35 is T30).
 
     Returns
     -------

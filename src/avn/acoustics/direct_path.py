@@ -1,15 +1,16 @@
-"""The first sound to arrive, added exactly to what the rays bring.
+"""Direct path from a source to receivers, computed exactly and added to the traced reflections.
 
-Two regimes decide what a wall does to it:
+Two regimes set the effect of walls:
 
-- ``transmission``: it comes straight from the source, whatever stands between, at 1/r.
-- ``diffraction``: where a wall stands between, it takes the shortest way round the corners and
-  comes from the last of them, weakened in each band by the screen formula of Maekawa (Applied
-  Acoustics 1, 1968) as fitted by 10 log10(3 + 20 N) dB, N = 2 x detour / wavelength, with the
-  detour of the whole way. Furniture lets it pass in both regimes.
+- ``transmission``: the direct path is the straight line, through all walls, and decays with 1/r.
+- ``diffraction``: where a wall blocks the straight line, the direct path is the shortest path round
+  the corners and arrives from the last of them. It is attenuated in each band by the screen formula
+  of Maekawa (Applied Acoustics 1, 1968) as fitted by 10 log10(3 + 20 N) dB,
+  N = 2 x detour / wavelength, with the detour of the whole path.
 
-The amplitude of an unweakened arrival is 1 / (sqrt(4 pi) D). It starts on a whole sample, so that
-the fraction of a sample does not colour it: the magnitude of its spectrum knows no time of flight.
+Furniture is transparent in both regimes. The amplitude without attenuation is 1 / (sqrt(4 pi) D).
+The onset is rounded to a whole sample, so that no fractional delay colours the spectrum and its
+magnitude does not depend on the time of flight.
 """
 
 from dataclasses import dataclass
@@ -31,16 +32,16 @@ REGIMES = ("transmission", "diffraction")
 
 @dataclass(frozen=True)
 class DirectPaths:
-    """What each of L listeners hears first, at the ears of the four headings.
+    """Binaural responses of the direct paths to L receivers, for the four headings.
 
     Attributes
     ----------
     samples : (L, 4, 2, F) int16
-        Heading, ear (0 left, 1 right), sample; x `scale` is the response.
+        Heading, ear (0 left, 1 right), sample; `samples * scale` is the response.
     scale : (L,) float32
-        0 where no sound arrives.
+        0 where there is no path.
     onset : (L,) int32
-        The sample of the impulse response where these samples begin.
+        Index of the first of these samples in the impulse response.
     """
 
     samples: NDArray[np.int16]
@@ -52,25 +53,42 @@ def find_paths(
     regime: str,
     walls: NDArray[np.float64],
     source: NDArray[np.float64],
-    listeners: NDArray[np.float64],
+    receivers: NDArray[np.float64],
 ) -> Paths:
-    """The ways of the first arrivals in a regime; raises `UserError` for an unknown one."""
+    """Find the direct paths of one source in a regime.
+
+    Parameters
+    ----------
+    regime : {"transmission", "diffraction"}
+        Effect of walls.
+    walls : array, shape (W, 4)
+        Solid blocks x0, y0, x1, y1 in plan, metres; used in `diffraction`.
+    source : array, shape (3,)
+        Position, metres.
+    receivers : array, shape (L, 3)
+        Positions, metres.
+
+    Raises
+    ------
+    UserError
+        If the regime is unknown.
+    """
     if regime == "transmission":
-        return straight_paths(source, listeners)
+        return straight_paths(source, receivers)
     if regime == "diffraction":
-        return diffracted_paths(walls, source, listeners)
+        return diffracted_paths(walls, source, receivers)
     raise UserError(f"acoustics.direct_path: '{regime}' is not known; use {' or '.join(REGIMES)}")
 
 
 def screen_loss(detour: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Loss in dB of sound that is bent round a screen, shape (..., 6), for detours in metres."""
+    """Compute the loss in dB of diffraction at a screen, shape (..., 6), for detours in metres."""
     wavelengths = SPEED_OF_SOUND / np.array(BANDS, dtype=np.float64)
     loss: NDArray[np.float64] = 10 * np.log10(3 + 20 * 2 * detour[..., None] / wavelengths)
     return loss
 
 
 def band_energies(paths: Paths) -> NDArray[np.float64]:
-    """Energy per square metre of the arrivals in each band, shape (L, 6)."""
+    """Compute the energy per square metre of the direct paths in each band, shape (L, 6)."""
     loss = np.where(paths.bent[:, None], screen_loss(paths.detour), 0.0)
     spread = 4 * np.pi * paths.length[:, None] ** 2
     reached = np.isfinite(paths.length)[:, None]
@@ -80,28 +98,29 @@ def band_energies(paths: Paths) -> NDArray[np.float64]:
 def render_paths(
     paths: Paths, filters: NDArray[np.float32], rate: int, loss_taps: int
 ) -> DirectPaths:
-    """Render ways to the ears.
+    """Render direct paths to binaural responses.
 
     Parameters
     ----------
     paths : Paths
+        Direct paths of one source.
     filters : array, shape (4, 2, 16, taps)
-        Of `avn.acoustics.hrtf`.
+        Filters of `avn.acoustics.hrtf.ShHrirs.filters`.
     rate : int
         Sampling rate in Hz.
     loss_taps : int
-        Length of the filters of bent ways; 1 where all ways are straight.
+        Length of the filters of diffracted paths; 1 where all paths are straight.
     """
-    people = len(paths.length)
+    receiver_count = len(paths.length)
     reached = np.isfinite(paths.length)
     arrival = np.where(reached[:, None], paths.arrival, [0.0, 1.0, 0.0])
     ears = np.einsum("hect,lc->lhet", filters.astype(np.float64), sh(arrival))
     energies = band_energies(paths)
-    loss = np.zeros((people, loss_taps))
-    loss[:, 0] = np.sqrt(energies[:, -1])  # what nothing weakens has a single tap
-    weakened = paths.bent & reached
-    if weakened.any():
-        loss[weakened] = minimum_phase(np.sqrt(energies[weakened]), rate, loss_taps)
+    loss = np.zeros((receiver_count, loss_taps))
+    loss[:, 0] = np.sqrt(energies[:, -1])  # a path without attenuation has a single tap
+    diffracted = paths.bent & reached
+    if diffracted.any():
+        loss[diffracted] = minimum_phase(np.sqrt(energies[diffracted]), rate, loss_taps)
     taps = ears.shape[-1] + loss_taps - 1
     if loss_taps == 1:
         ears *= loss[:, None, None]
@@ -110,6 +129,6 @@ def render_paths(
         spectra = fft.rfft(ears, size) * fft.rfft(loss, size)[:, None, None]
         ears = fft.irfft(spectra, size)[..., :taps]
     samples, scale = to_int16(ears)
-    ways = np.where(reached, paths.length, 0.0)
-    onset = np.rint(ways * (rate / SPEED_OF_SOUND)).astype(np.int32)
+    lengths = np.where(reached, paths.length, 0.0)
+    onset = np.rint(lengths * (rate / SPEED_OF_SOUND)).astype(np.int32)
     return DirectPaths(samples, scale, onset)

@@ -1,7 +1,6 @@
 """Dry sounds: recordings that sources emit, read from the package or from any audio file.
 
-Every sound becomes mono, of one sampling rate, free of offset and of unit RMS, and loops without
-end.
+Every sound is converted to mono, one sampling rate, mean 0 and RMS 1, and is looped.
 """
 
 import hashlib
@@ -19,13 +18,13 @@ from scipy.signal import resample_poly
 from avn.acoustics.audio_files import missing_part
 from avn.core.errors import UserError
 
-RATE = 16000  # the default
+RATE = 16000  # default sampling rate, Hz
 BUILTIN = ("ring", "alarm", "clock")
 
 SHORTEST_SECONDS = 0.01
 RATES = (1000, 768000)
 SILENCE = 1e-5  # RMS, -100 dB of full scale
-LEAST_KEPT = 0.01  # of the RMS that has to lie below half the sampling rate: -40 dB
+LEAST_KEPT = 0.01  # share of the RMS that has to be below half the sampling rate: -40 dB
 
 
 def read_sound(path: str | Path, rate: int = RATE) -> NDArray[np.float32]:
@@ -36,32 +35,32 @@ def read_sound(path: str | Path, rate: int = RATE) -> NDArray[np.float32]:
     path : str or Path
         A file that libsndfile reads (WAV, FLAC, OGG, MP3, AIFF, ...), of any sampling rate and any
         number of channels, or one of ``BUILTIN``. ``~`` is the home directory. The name of a
-        built-in sound wins over a file of the same name.
+        built-in sound has precedence over a file of the same name.
     rate : int
-        Sampling rate wanted, in Hz.
+        Sampling rate of the result in Hz.
 
     Returns
     -------
     float32 array, shape (n,)
         The mean of the channels at that rate, of mean 0 and RMS 1. A recording shorter than a
-        second is repeated as often as it takes to fill one, so n >= rate and the sound loops.
+        second is repeated to fill one, so n >= rate.
 
     Raises
     ------
     UserError
-        The file is missing, a folder, empty, not audio, truncated, shorter than 10 ms, silent (as
-        a whole, once its channels are mixed, or below half the rate), or has samples that are no
-        numbers.
+        If the file is missing, a folder, empty, not audio, truncated, shorter than 10 ms, silent
+        (as a whole, after mixing of its channels, or below half the rate), or has samples that are
+        not finite.
     """
     content = _content(str(path))
-    samples, own_rate = _decode(content, str(path))
+    samples, file_rate = _decode(content, str(path))
     mixed = samples.mean(axis=1)
     mixed -= mixed.mean()
     loudness = _rms(mixed)
     if loudness < SILENCE:
         raise _error(path, "is silent once mixed to one channel", "take a recording that sounds")
-    common = gcd(rate, own_rate)
-    heard = resample_poly(mixed, rate // common, own_rate // common)
+    common = gcd(rate, file_rate)
+    heard = resample_poly(mixed, rate // common, file_rate // common)
     heard -= heard.mean()
     if _rms(heard) < LEAST_KEPT * loudness:
         wrong = f"is silent below {rate / 2000:g} kHz"
@@ -78,7 +77,7 @@ def load_sounds(mapping: Mapping[str, str], rate: int = RATE) -> dict[str, NDArr
     mapping : mapping
         Name of the sound to the name of a built-in sound or the path of a file.
     rate : int
-        Sampling rate wanted, in Hz.
+        Sampling rate of the result in Hz.
 
     Returns
     -------
@@ -88,14 +87,14 @@ def load_sounds(mapping: Mapping[str, str], rate: int = RATE) -> dict[str, NDArr
     Raises
     ------
     UserError
-        As `read_sound`, or the mapping is empty.
+        If `read_sound` raises it, or the mapping is empty.
     """
     _require_sounds(mapping)
     return {name: read_sound(path, rate) for name, path in mapping.items()}
 
 
 def content_hash(mapping: Mapping[str, str]) -> dict[str, str]:
-    """Hashes of what the sounds hold, wherever the files lie.
+    """Hash the content of the sounds, independently of the files' paths.
 
     Parameters
     ----------
@@ -110,14 +109,14 @@ def content_hash(mapping: Mapping[str, str]) -> dict[str, str]:
     Raises
     ------
     UserError
-        A file is missing, a folder, empty or cannot be read, or the mapping is empty.
+        If a file is missing, a folder, empty or cannot be read, or the mapping is empty.
     """
     _require_sounds(mapping)
     return {name: hashlib.sha256(_content(str(path))).hexdigest() for name, path in mapping.items()}
 
 
 def _require_sounds(mapping: Mapping[str, str]) -> None:
-    """Refuse a config without sounds."""
+    """Raise a `UserError` for a config without sounds."""
     if not mapping:
         raise UserError(f"sound: no sound is named; give {_choices()}")
 
@@ -131,7 +130,7 @@ def _error(path: str | Path, wrong: str, remedy: str) -> UserError:
 
 
 def _content(path: str) -> bytes:
-    """Bytes of a built-in sound or of a file."""
+    """Read the bytes of a built-in sound or of a file."""
     if path in BUILTIN:
         return (resources.files("avn") / "assets" / "dry_sounds" / f"{path}.flac").read_bytes()
     try:
@@ -152,12 +151,13 @@ def _content(path: str) -> bytes:
 
 
 class _Seekable(io.BytesIO):
-    """Bytes in which a damaged header that points before the first one moves nothing.
+    """Stream of bytes that ignores seeks to before its start, which damaged headers cause.
 
-    libsndfile seeks through callbacks that cannot raise: an exception there is printed, not seen.
+    libsndfile seeks through callbacks that cannot raise: an exception there is only printed.
     """
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        """See `io.BytesIO.seek`."""
         try:
             return super().seek(offset, whence)
         except ValueError:
@@ -165,7 +165,7 @@ class _Seekable(io.BytesIO):
 
 
 def _decode(content: bytes, path: str) -> tuple[NDArray[np.float64], int]:
-    """Samples (n, channels) and rate of an audio file that is whole and has sound samples."""
+    """Decode an audio file to samples (n, channels) and a rate in Hz; raise for a bad one."""
     lost = missing_part(content)
     again = "copy or convert it again"
     try:
@@ -192,7 +192,7 @@ def _decode(content: bytes, path: str) -> tuple[NDArray[np.float64], int]:
 
 
 def _require_sound_samples(samples: NDArray[np.float64], rate: int, path: str) -> None:
-    """Refuse a recording that is empty, too short or not made of numbers."""
+    """Raise a `UserError` for a recording that is empty, too short or not finite."""
     if not len(samples):
         raise _error(path, "is empty (0 samples)", "take a recording that sounds")
     if len(samples) < SHORTEST_SECONDS * rate:
@@ -203,7 +203,7 @@ def _require_sound_samples(samples: NDArray[np.float64], rate: int, path: str) -
 
 
 def _short(error: Exception) -> str:
-    """What a library says, on one line."""
+    """Return the message of a library's error on one line."""
     return " ".join(str(error).split()).rstrip(".") or type(error).__name__
 
 

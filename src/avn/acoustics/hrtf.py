@@ -1,7 +1,7 @@
 """Measured head-related impulse responses, as filters of third-order ambisonic channels.
 
 The set is that of Omnitone 1.3.0 (Apache-2.0), made from the SADIE measurements of a KU 100 dummy
-head; credit and licence lie beside it in ``assets/hrirs``. The head is taken as symmetric: the set
+head; credit and licence are beside it in ``assets/hrirs``. The head is assumed symmetric: the set
 holds the left ear, and the right ear is its mirror image.
 """
 
@@ -19,7 +19,7 @@ from avn.acoustics.ambisonics import CHANNELS, DEGREES, rotation_to_heading, sh
 
 HEADINGS = 4
 
-# The level of a head is set at this sampling rate, for all rates alike.
+# Sampling rate at which the level of the filters is set for all rates, Hz.
 LEVEL_RATE = 16000
 
 
@@ -30,8 +30,8 @@ class ShHrirs:
     Attributes
     ----------
     left : array, shape (16, taps)
-        Impulse responses that are applied to the ambisonic channels (ACN, SN3D) in the frame of
-        the head and summed. As stored: int16 full scale is 1.
+        Impulse responses, to be convolved with the ambisonic channels (ACN, SN3D) in the frame of
+        the head and summed. int16 full scale is 1.
     rate : int
         Sampling rate in Hz.
     """
@@ -40,12 +40,12 @@ class ShHrirs:
     rate: int
 
     def filters(self, rate: int = 16000) -> NDArray[np.float32]:
-        """Filters from a world-north ambisonic impulse response to the ears of an agent.
+        """Compute the filters from ambisonic channels in the world frame to an agent's ears.
 
         Parameters
         ----------
         rate : int
-            Sampling rate wanted, in Hz.
+            Sampling rate of the filters in Hz.
 
         Returns
         -------
@@ -56,10 +56,10 @@ class ShHrirs:
 
         Notes
         -----
-        Level: one constant, the same for every rate, scales all of it, so that a plane wave of
-        unit amplitude from the front arrives with unit energy at 16 kHz, averaged over the two
-        ears: the mean of |H|^2 from 0 Hz to 8 kHz is 1. So a binaural response has the level that
-        an omnidirectional microphone would pick up in front.
+        One constant, the same for every rate, scales all filters, so that a plane wave of unit
+        amplitude from the front has unit energy at 16 kHz, averaged over the two ears: the mean
+        of |H|^2 from 0 Hz to 8 kHz is 1. So a binaural response has the level of an
+        omnidirectional microphone for sound from the front.
         """
         ears = self._resampled(rate)
         front = np.einsum("ect,c->et", self._resampled(LEVEL_RATE), sh([0.0, 1.0, 0.0]))
@@ -71,18 +71,18 @@ class ShHrirs:
         return np.stack(turned).astype(np.float32)
 
     def _resampled(self, rate: int) -> NDArray[np.float64]:
-        """Responses of the left and the right ear at a sampling rate, (2, 16, taps)."""
+        """Resample the responses of the left and the right ear to a rate in Hz, (2, 16, taps)."""
         common = gcd(rate, self.rate)
         up, down = rate // common, self.rate // common
-        # `resample_poly` keeps the height of an impulse response, while its spectrum has to stay:
-        # the sum over `down / up` times as few taps needs as much more height.
+        # `resample_poly` keeps the amplitude of an impulse response; to keep the spectrum, the
+        # taps, `down / up` times fewer, are multiplied by that ratio.
         left = resample_poly(self.left, up, down, axis=1) * (down / up)
         return np.stack([left, np.where(DEGREES[:, None] < 0, -left, left)])
 
 
 @lru_cache(maxsize=1)
 def load_sh_hrirs() -> ShHrirs:
-    """The SH-HRIRs that the package ships.
+    """Load the SH-HRIRs of the package.
 
     Returns
     -------

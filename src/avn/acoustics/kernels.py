@@ -1,6 +1,6 @@
-"""What a ray meets and where it goes on to: compiled.
+"""Intersection and reflection of rays, compiled by Numba.
 
-Random numbers come from a hash of (seed, ray, bounce), so results depend neither on threads nor on
+Random numbers are a hash of (seed, ray, bounce, draw), so results depend neither on threads nor on
 the order of work.
 """
 
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 _A = np.uint64(0x9E3779B97F4A7C15)
 _B = np.uint64(0xBF58476D1CE4E5B9)
 _C = np.uint64(0x94D049BB133111EB)
-_NEAR = 1e-7  # metres: a ray does not meet again the surface that it has just left
+_NEAR = 1e-7  # metres: a ray does not hit the surface again that it has just left
 
 
 @njit(cache=True, inline="always")
 def _mix(state):  # type: ignore[no-untyped-def]
-    """The finaliser of splitmix64 (Steele, Lea and Flood, OOPSLA 2014)."""
+    """Apply the finaliser of splitmix64 (Steele, Lea and Flood, OOPSLA 2014)."""
     state = (state ^ (state >> np.uint64(30))) * _B
     state = (state ^ (state >> np.uint64(27))) * _C
     return state ^ (state >> np.uint64(31))
@@ -27,7 +27,13 @@ def _mix(state):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def uniform(seed: int, ray: int, bounce: int, draw: int) -> float:
-    """A number in [0, 1) that is a pure function of the four integers."""
+    """Return a uniform random number in [0, 1), a pure function of four integers.
+
+    Parameters
+    ----------
+    seed, ray, bounce, draw : int
+        Words of the hash; `draw` numbers the draws at one reflection.
+    """
     state = _mix(np.uint64(seed) + _A)
     state = _mix(state + np.uint64(ray) * _A)
     state = _mix(state + np.uint64(bounce) * _A)
@@ -35,12 +41,21 @@ def uniform(seed: int, ray: int, bounce: int, draw: int) -> float:
     return float(state >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-class Room(NamedTuple):
+class SortedSurfaces(NamedTuple):
     """Rectangles grouped by the axis of their normal and sorted by offset within a group.
 
-    `starts` (4,) bounds the groups; `axis`, `offset` (Q,), `lower`, `upper` (Q, 2) are those of
-    `avn.apartments.surfaces`; `reflection` and `scattering` (Q, 6) are shares of energy,
-    `mean_scattering` (Q,) is the mean over the bands.
+    Attributes
+    ----------
+    starts : (4,) int64
+        Bounds of the three groups.
+    axis, offset : (Q,)
+        As in `avn.apartments.surfaces.Surfaces`; offsets in metres.
+    lower, upper : (Q, 2) float64
+        As in `avn.apartments.surfaces.Surfaces`, metres.
+    reflection, scattering : (Q, 6) float64
+        Share of the energy that is reflected, and share of the reflected energy that is scattered.
+    mean_scattering : (Q,) float64
+        Mean over the bands.
     """
 
     starts: NDArray[np.int64]
@@ -53,12 +68,14 @@ class Room(NamedTuple):
     mean_scattering: NDArray[np.float64]
 
 
-def plan_bounds(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The least and the greatest x and y of all rectangles, (2,) each."""
+def plan_bounds(surfaces: SortedSurfaces) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and the greatest x and y of all rectangles, (2,) each, metres."""
     corners = np.concatenate(
         [
-            np.insert(side[room.axis == axis], axis, room.offset[room.axis == axis], axis=1)
-            for side in (room.lower, room.upper)
+            np.insert(
+                side[surfaces.axis == axis], axis, surfaces.offset[surfaces.axis == axis], axis=1
+            )
+            for side in (surfaces.lower, surfaces.upper)
             for axis in range(3)
         ]
     )
@@ -66,13 +83,27 @@ def plan_bounds(room: Room) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 @njit(cache=True)
-def nearest_hit(position, direction, room: Room) -> tuple[float, int]:  # type: ignore[no-untyped-def]
-    """Distance to, and index of, the first rectangle that a ray meets; (inf, -1) if none.
+def nearest_hit(position, direction, surfaces: SortedSurfaces) -> tuple[float, int]:  # type: ignore[no-untyped-def]
+    """Find the first rectangle that a ray hits.
 
-    Each group of rectangles is walked away from the ray's origin and left as soon as it lies
-    behind what has been found.
+    Each group of rectangles is searched outwards from the ray's origin, until it is farther than
+    the nearest hit so far.
+
+    Parameters
+    ----------
+    position, direction : array, shape (3,)
+        Origin in metres, and unit vector.
+    surfaces : SortedSurfaces
+        Reflecting rectangles.
+
+    Returns
+    -------
+    distance : float
+        Metres; infinite if there is no hit.
+    index : int
+        Index of the rectangle; -1 if there is no hit.
     """
-    starts, offset, lower, upper = room.starts, room.offset, room.lower, room.upper
+    starts, offset, lower, upper = surfaces.starts, surfaces.offset, surfaces.lower, surfaces.upper
     best = math.inf
     found = -1
     for axis in range(3):
@@ -103,7 +134,19 @@ def nearest_hit(position, direction, room: Room) -> tuple[float, int]:  # type: 
 
 @njit(cache=True)
 def reflect(direction, axis: int, specular: bool, first: float, second: float) -> None:  # type: ignore[no-untyped-def]
-    """Turn a ray in place at a surface: mirrored, or after Lambert's cosine law."""
+    """Reflect a ray's direction in place: specularly, or after Lambert's cosine law.
+
+    Parameters
+    ----------
+    direction : array, shape (3,)
+        Unit vector; changed in place.
+    axis : int
+        Axis of the surface's normal.
+    specular : bool
+        True for a specular reflection.
+    first, second : float
+        Uniform random numbers in [0, 1) that give the direction of a diffuse reflection.
+    """
     side = -1.0 if direction[axis] > 0 else 1.0
     if specular:
         direction[axis] = -direction[axis]

@@ -1,14 +1,14 @@
-"""What surfaces and air do to sound, in six octave bands.
+"""Absorption and scattering of materials, and absorption of air, in six octave bands.
 
 Absorption is the random-incidence coefficient of published tables:
 
 [V] M. Vorlaender, *Auralization*, Springer 2008, annex (tables of absorption and scattering).
 [E] M. D. Egan, *Architectural Acoustics*, McGraw-Hill 1988, table of absorption data.
 [C] T. Cox and P. D'Antonio, *Acoustic Absorbers and Diffusers*, appendix A.
-[N] EN 12354-6:2003: a hard object in a room (a cabinet, a table, a stove) absorbs, with what it
-    holds and the gaps about it, like an open window of V^(2/3) square metres. Over the faces that
-    common pieces show, that is about a quarter: wardrobe 0.23, dresser 0.25, counter 0.30,
-    fridge 0.21. Plain panels of tables would leave a furnished flat as bare as an empty one.
+[N] EN 12354-6:2003: a hard object in a room (a cabinet, a table, a stove), with its content and
+    the gaps around it, has an equivalent absorption area of V^(2/3) square metres. Over the exposed
+    faces of common pieces that is about a quarter: wardrobe 0.23, dresser 0.25, counter 0.30,
+    fridge 0.21. With the tables' values for plain panels, furniture would hardly absorb.
 
 Scattering of tables and seats is that of [V]; for building surfaces and single pieces the
 coefficient at mid frequency of
@@ -16,9 +16,9 @@ coefficient at mid frequency of
 [Z] X. Zeng, C. L. Christensen, J. H. Rindel, "Practical methods to define scattering coefficients
     in a room acoustics computer model", *Applied Acoustics* 67, 2006,
 
-is spread over the bands, rising with the square root of frequency through 707 Hz. Walls that are
-lived with carry pictures, lamps and switches that a floor plan leaves out, so the upper end of [Z]
-for plain walls (0.1) stands for them.
+is extended to the bands, proportional to the square root of frequency through 707 Hz. Walls of
+inhabited rooms carry pictures, lamps and switches that a floor plan leaves out, so they have the
+upper end of [Z] for plain walls (0.1).
 """
 
 from collections.abc import Iterable
@@ -31,9 +31,9 @@ from avn.core.errors import UserError
 BANDS = (125, 250, 500, 1000, 2000, 4000)
 SPEED_OF_SOUND = 343.0  # m/s, at 20 degrees
 
-_MID_FREQUENCY = 707.0  # where [Z] gives its coefficients
+_MID_FREQUENCY = 707.0  # Hz, of the coefficients of [Z]
 
-# Where no table lists the very thing, the row of what is nearest to it is taken and named.
+# A material that no table lists has the row of the most similar one, which the comment names.
 _ABSORPTION: dict[str, tuple[float, ...]] = {
     "parquet": (0.15, 0.11, 0.10, 0.07, 0.06, 0.07),  # [E] wood floor on joists
     "carpet": (0.08, 0.24, 0.57, 0.69, 0.71, 0.73),  # [E] heavy carpet on foam
@@ -94,7 +94,7 @@ def _rows(table: dict[str, tuple[float, ...]], names: Iterable[str]) -> NDArray[
 
 
 def absorption(names: Iterable[str]) -> NDArray[np.float64]:
-    """Share of the energy that a material swallows at each reflection.
+    """Return the absorption coefficients of materials.
 
     Parameters
     ----------
@@ -109,15 +109,16 @@ def absorption(names: Iterable[str]) -> NDArray[np.float64]:
     Raises
     ------
     UserError
-        Where a name is unknown.
+        If a name is unknown.
     """
     return _rows(_ABSORPTION, names)
 
 
 def scattering(names: Iterable[str]) -> NDArray[np.float64]:
-    """Share of the reflected energy that leaves in other than the mirror direction.
+    """Return the scattering coefficients of materials, shape (M, 6).
 
-    Parameters and errors are those of `absorption`; the shape is (M, 6).
+    The coefficient is the share of the reflected energy that is not reflected specularly.
+    Parameters and errors are those of `absorption`.
     """
     return _rows(_SCATTERING, names)
 
@@ -125,7 +126,7 @@ def scattering(names: Iterable[str]) -> NDArray[np.float64]:
 def air_attenuation(
     frequencies: ArrayLike = BANDS, celsius: float = 20.0, humidity: float = 50.0
 ) -> NDArray[np.float64]:
-    """Energy that air swallows, as the m of exp(-m x distance).
+    """Compute the attenuation of energy by air, the m of exp(-m x distance).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Microphones: what becomes of sound between the ears and the samples of a clip."""
+"""Microphones, which turn the sound at the ears into the samples of a clip."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from avn.core.errors import UserError
 
 
 class Microphone:
-    """Two microphones, one an ear: a gain, then noise.
+    """Two microphones, one at each ear: a gain, then additive noise.
 
-    Another condition is a class derived from this one, with parameters of its own.
+    Derive from this class for other conditions.
 
     Parameters
     ----------
     noise_rms : float
         RMS of each microphone's noise. Dry sounds have RMS 1, so the direct sound of a source at
         1 m in front has 1 / sqrt(4 pi) = 0.28, which is 35 dB above the default; three rooms
-        away, some 24 dB weaker, sound still stands 11 dB above it.
+        away, some 24 dB weaker, sound is still 11 dB above it.
     gain : float
         Factor on the sound at the microphone, before its noise.
 
     Raises
     ------
     UserError
-        For a value that makes no sense.
+        If a value is out of range.
     """
 
     def __init__(self, noise_rms: float = 0.005, gain: float = 1.0) -> None:
@@ -38,14 +38,14 @@ class Microphone:
         self.noise_rms, self.gain = noise_rms, gain
 
     def record(self, clips: Tensor, noise: Callable[[int], Tensor]) -> Tensor:
-        """What it makes of clips; may change them in place.
+        """Record clips; may change them in place.
 
         Parameters
         ----------
         clips : (N, 2, T) float32 tensor
             Sound at the left and the right ear.
         noise : callable
-            Gives noise of RMS 1 for ear 0 or 1, (N, T), the same at every call.
+            Returns noise of RMS 1 for ear 0 or 1, (N, T), the same at every call.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Spheres that listen, and which of them a ray passes: compiled."""
+"""Receiver spheres in a uniform grid, and their intersection with rays, compiled by Numba."""
 
 import math
 from typing import NamedTuple
@@ -8,12 +8,23 @@ from numba import njit
 from numpy.typing import NDArray
 
 
-class Listeners(NamedTuple):
-    """L spheres sorted into square columns over x and y.
+class Receivers(NamedTuple):
+    """Receiver spheres, L in all, sorted into square columns over x and y.
 
-    `box` (2, 3) bounds them all, `cell` is the width of a column, `shape` (2,) their number along
-    x and y; `members[starts[c] : starts[c + 1]]` are the spheres that reach into column c;
-    `centres` (L, 3) and `radius` are their own.
+    Attributes
+    ----------
+    box : (2, 3) float64
+        Bounds of all spheres, metres.
+    cell : float
+        Width of a column, metres.
+    shape : (2,) int64
+        Number of columns along x and y.
+    starts, members : int64
+        `members[starts[c] : starts[c + 1]]` are the spheres that reach into column c.
+    centres : (L, 3) float64
+        Metres.
+    radius : float
+        Metres.
     """
 
     box: NDArray[np.float64]
@@ -25,16 +36,26 @@ class Listeners(NamedTuple):
     radius: float
 
 
-class Met(NamedTuple):
-    """Room for the answers of `passed_listeners`, (L,) each."""
+class Hits(NamedTuple):
+    """Buffers for the result of `intersected_receivers`, (L,) each.
 
-    seen: NDArray[np.int64]
-    found: NDArray[np.int64]
+    Attributes
+    ----------
+    last_stamp : int64
+        Stamp of the ray segment that last tested a receiver.
+    receivers : int64
+        Indices of the receivers that are hit.
+    chords, midpoints : float64
+        Length of each chord and distance to its middle along the ray, metres.
+    """
+
+    last_stamp: NDArray[np.int64]
+    receivers: NDArray[np.int64]
     chords: NDArray[np.float64]
-    middles: NDArray[np.float64]
+    midpoints: NDArray[np.float64]
 
 
-def sort_listeners(centres: NDArray[np.float64], radius: float) -> Listeners:
+def sort_receivers(centres: NDArray[np.float64], radius: float) -> Receivers:
     """Sort spheres with the given centres (L, 3) into columns as wide as a sphere."""
     cell = 2 * radius
     low, high = centres.min(axis=0) - radius, centres.max(axis=0) + radius
@@ -46,21 +67,21 @@ def sort_listeners(centres: NDArray[np.float64], radius: float) -> Listeners:
     columns, owners = [], []
     for dx in range(2):
         for dy in range(2):
-            place = first + np.array([dx, dy])
-            inside = (place <= last).all(axis=1)
-            columns.append(place[inside, 0] * shape[1] + place[inside, 1])
+            square = first + np.array([dx, dy])
+            inside = (square <= last).all(axis=1)
+            columns.append(square[inside, 0] * shape[1] + square[inside, 1])
             owners.append(np.flatnonzero(inside))
     column, member = np.concatenate(columns), np.concatenate(owners)
     order = np.lexsort((member, column))
     counts = np.bincount(column, minlength=int(shape.prod()))
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     members = member[order].astype(np.int64)
-    return Listeners(np.stack([low, high]), cell, shape, starts, members, centres, radius)
+    return Receivers(np.stack([low, high]), cell, shape, starts, members, centres, radius)
 
 
 @njit(cache=True)
 def _clip(low: float, high: float, here: float, slope: float, near: float, far: float):  # type: ignore[no-untyped-def]
-    """The part of [near, far] of a ray where one coordinate lies within [low, high]."""
+    """Clip the interval [near, far] of a ray to where one coordinate is within [low, high]."""
     if abs(slope) < 1e-12:
         return (near, far) if low <= here <= high else (1.0, 0.0)
     a, b = (low - here) / slope, (high - here) / slope
@@ -70,24 +91,41 @@ def _clip(low: float, high: float, here: float, slope: float, near: float, far: 
 
 
 @njit(cache=True)
-def passed_listeners(  # type: ignore[no-untyped-def]
-    position, direction, length, listeners: Listeners, met: Met, stamp: int
+def intersected_receivers(  # type: ignore[no-untyped-def]
+    position, direction, length, receivers: Receivers, hits: Hits, stamp: int
 ) -> int:
-    """Listeners whose sphere a stretch of a ray crosses.
+    """Find the receivers whose sphere a segment of a ray crosses.
 
-    The columns are walked one after the other. `met.seen` marks with `stamp` who has been
-    looked at, since a sphere may lie in several columns. Writes index, chord length and distance
-    of the chord's middle into `met` and returns the count.
+    Traverses the grid of columns (Amanatides and Woo, Eurographics 1987).
+
+    Parameters
+    ----------
+    position, direction : array, shape (3,)
+        Start of the segment in metres, and unit vector.
+    length : float
+        Metres.
+    receivers : Receivers
+        Spheres in their columns.
+    hits : Hits
+        Takes the index, chord length and chord midpoint of each.
+    stamp : int
+        Number of the segment. It marks receivers that have been tested, since a sphere may lie
+        in several columns.
+
+    Returns
+    -------
+    int
+        Number of receivers that are hit.
     """
-    box, cell, shape = listeners.box, listeners.cell, listeners.shape
-    centres, radius = listeners.centres, listeners.radius
+    box, cell, shape = receivers.box, receivers.cell, receivers.shape
+    centres, radius = receivers.centres, receivers.radius
     near, far = 0.0, length
     for axis in range(3):
         near, far = _clip(box[0, axis], box[1, axis], position[axis], direction[axis], near, far)
     count = 0
     if near >= far:
         return count
-    # Where the walk starts, and where along the ray it crosses the next line of the grid.
+    # Column in which the traversal starts, and distances along the ray to the next grid lines.
     ix = min(max(int((position[0] + near * direction[0] - box[0, 0]) / cell), 0), shape[0] - 1)
     iy = min(max(int((position[1] + near * direction[1] - box[0, 1]) / cell), 0), shape[1] - 1)
     sx = 1 if direction[0] > 0 else -1
@@ -101,15 +139,15 @@ def passed_listeners(  # type: ignore[no-untyped-def]
         step_y = cell / abs(direction[1])
         next_y = (box[0, 1] + (iy + (sy > 0)) * cell - position[1]) / direction[1]
     while True:
-        where = ix * shape[1] + iy
-        for entry in range(listeners.starts[where], listeners.starts[where + 1]):
-            who = listeners.members[entry]
-            if met.seen[who] == stamp:
+        column = ix * shape[1] + iy
+        for entry in range(receivers.starts[column], receivers.starts[column + 1]):
+            receiver = receivers.members[entry]
+            if hits.last_stamp[receiver] == stamp:
                 continue
-            met.seen[who] = stamp
-            dx = centres[who, 0] - position[0]
-            dy = centres[who, 1] - position[1]
-            dz = centres[who, 2] - position[2]
+            hits.last_stamp[receiver] = stamp
+            dx = centres[receiver, 0] - position[0]
+            dy = centres[receiver, 1] - position[1]
+            dz = centres[receiver, 2] - position[2]
             along = dx * direction[0] + dy * direction[1] + dz * direction[2]
             half = radius * radius - (dx * dx + dy * dy + dz * dz - along * along)
             if half <= 0.0:
@@ -117,9 +155,9 @@ def passed_listeners(  # type: ignore[no-untyped-def]
             half = math.sqrt(half)
             enter, leave = max(along - half, 0.0), min(along + half, length)
             if leave > enter:
-                met.found[count] = who
-                met.chords[count] = leave - enter
-                met.middles[count] = 0.5 * (enter + leave)
+                hits.receivers[count] = receiver
+                hits.chords[count] = leave - enter
+                hits.midpoints[count] = 0.5 * (enter + leave)
                 count += 1
         if next_x < next_y:
             if next_x > far:

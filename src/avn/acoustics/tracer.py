@@ -1,15 +1,15 @@
-"""Ray tracing: what every listener receives of one source, reflection by reflection.
+"""Energy ray tracing from one source to all receivers.
 
-Rays leave the source on a Fibonacci lattice, carry energy in six octave bands and are reflected
-like from a mirror or after Lambert's law, by the scattering of what they meet. Listeners are
+Rays leave the source on a Fibonacci lattice and carry energy in six octave bands. A surface
+reflects them specularly or after Lambert's law, as its scattering coefficient says. Receivers are
 spheres; a ray that crosses one adds energy x chord / volume, which is the energy that flows through
-the place per unit of area (E / (4 pi D^2) for the direct sound). The direct sound itself is left
-out: `avn.acoustics.direct_path` adds it exactly. `avn.acoustics.population` keeps about as many
-rays in every place.
+the sphere per unit of area (E / (4 pi D^2) for the direct sound). The direct sound itself is left
+out: `avn.acoustics.direct_path` adds it exactly. `avn.acoustics.population` keeps the number of
+rays about equal in all parts of the plan.
 
-A ray has one direction for all bands. It is drawn by the mean scattering over the bands; at its
-first reflections, which shape what is heard most, each band is weighted so that its own scattering
-holds in the mean. Weighting all reflections would let the weights of a long path run away.
+A ray has one direction for all bands. The mean scattering over the bands decides how it is
+reflected. At the first reflections, which contribute most, each band is weighted so that its own
+scattering holds in expectation. At later ones it is not: the weights of long paths would diverge.
 """
 
 from dataclasses import dataclass
@@ -19,39 +19,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.acoustics import materials
-from avn.acoustics.kernels import Room, plan_bounds, uniform
+from avn.acoustics.kernels import SortedSurfaces, plan_bounds, uniform
 from avn.acoustics.population import Rays, even_out
 from avn.acoustics.rays import Limits, Record, follow
-from avn.acoustics.receivers import Listeners, sort_listeners
+from avn.acoustics.receivers import Receivers, sort_receivers
 from avn.apartments.surfaces import Surfaces
 
-LATE_REACH = 1.5  # rays go on for so many times `seconds`, to measure what is cut off
-LATE_EVERY = 4  # one ray for so many goes on there
+LATE_REACH = 1.5  # rays are followed for this multiple of `seconds`, to measure the truncated part
+LATE_EVERY = 4  # after `seconds`, one ray in so many is followed
 WEIGHTED_REFLECTIONS = 2
 ENERGY_FLOOR = 1e-8  # a ray that has lost 80 dB in its loudest band ends
-STEP = 5.0  # metres for which rays are followed before their numbers are evened out
+STEP = 5.0  # metres between two runs of splitting and Russian roulette
 _EVENTS_AT_ONCE = 1 << 15
 
 
 @dataclass(frozen=True)
 class Events:
-    """What L listeners receive, as N events sorted by listener.
+    """Sound events at L receivers, N in all, sorted by receiver.
 
     Attributes
     ----------
     starts : (L + 1,) int64
-        Events `starts[l]` to `starts[l + 1]` belong to listener l.
+        Events `starts[l]` to `starts[l + 1]` belong to receiver l.
     distance : (N,) float32
-        Length of the way from the source, metres.
+        Path length from the source, metres.
     energy : (N, 6) float32
-        Energy per square metre in each octave band, of a source that sends out 1 in each.
+        Energy per square metre in each octave band, of a source that emits 1 in each.
     arrival : (N, 3) float32
-        Unit vectors from the listener to where the sound comes from.
+        Unit vectors from the receiver towards the direction of arrival.
     sign : (N,) int8
-        -1 or 1, drawn: the phase of an event is not known to rays.
+        -1 or 1, drawn at random: rays carry no phase.
     seconds : float
-        Up to here all rays were followed; later events stem from few rays and serve to measure
-        what is cut off.
+        All rays were followed up to this time. Later events stem from a part of the rays and
+        serve to measure the truncated energy.
     """
 
     starts: NDArray[np.int64]
@@ -61,28 +61,28 @@ class Events:
     sign: NDArray[np.int8]
     seconds: float
 
-    def listener(self) -> NDArray[np.int64]:
-        """The listener of every event, shape (N,)."""
+    def receiver(self) -> NDArray[np.int64]:
+        """Return the receiver's index of every event, shape (N,)."""
         return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
 
     def histogram(self, width: float = 0.001) -> NDArray[np.float64]:
-        """Energy over time, shape (L, bins, 6), in bins of `width` seconds up to `seconds`."""
+        """Sum energy over time, shape (L, bins, 6), in bins of `width` seconds up to `seconds`."""
         bins = round(self.seconds / width)
-        people = len(self.starts) - 1
-        place = (self.distance / (materials.SPEED_OF_SOUND * width)).astype(np.int64)
-        kept = place < bins
-        flat = (self.listener() * bins + place)[kept]
+        receiver_count = len(self.starts) - 1
+        time_bin = (self.distance / (materials.SPEED_OF_SOUND * width)).astype(np.int64)
+        kept = time_bin < bins
+        flat = (self.receiver() * bins + time_bin)[kept]
         columns = [
-            np.bincount(flat, weights=self.energy[kept, band], minlength=people * bins)
+            np.bincount(flat, weights=self.energy[kept, band], minlength=receiver_count * bins)
             for band in range(self.energy.shape[1])
         ]
-        return np.stack(columns, axis=-1).astype(np.float64).reshape(people, bins, -1)
+        return np.stack(columns, axis=-1).astype(np.float64).reshape(receiver_count, bins, -1)
 
 
 def fibonacci_directions(count: int, turn: float = 0.0) -> NDArray[np.float64]:
-    """Unit vectors spread evenly over the sphere, shape (count, 3).
+    """Return unit vectors spread evenly over the sphere, shape (count, 3).
 
-    The golden-angle spiral (A. Gonzalez, Mathematical Geosciences 42, 2010), turned about the
+    The golden-angle spiral (A. Gonzalez, Mathematical Geosciences 42, 2010), rotated about the
     vertical by `turn` radians.
     """
     index = np.arange(count, dtype=np.float64)
@@ -92,11 +92,11 @@ def fibonacci_directions(count: int, turn: float = 0.0) -> NDArray[np.float64]:
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
 
 
-def _sorted_room(
+def _sort_surfaces(
     surfaces: Surfaces,
     absorption: NDArray[np.float64] | None,
     scattering: NDArray[np.float64] | None,
-) -> Room:
+) -> SortedSurfaces:
     if absorption is None:
         absorption = materials.absorption(surfaces.materials)
     if scattering is None:
@@ -105,7 +105,7 @@ def _sorted_room(
     axis = surfaces.axis[order].astype(np.int64)
     material = surfaces.material[order]
     scattered = np.asarray(scattering, dtype=np.float64)[material]
-    return Room(
+    return SortedSurfaces(
         starts=np.searchsorted(axis, np.arange(4)).astype(np.int64),
         axis=axis,
         offset=surfaces.offset[order],
@@ -139,28 +139,28 @@ def _start(source: NDArray[np.float64], rays: int, seed: int) -> Rays:
 
 def _follow_all(
     rays: Rays,
-    room: Room,
+    sorted_surfaces: SortedSurfaces,
     attenuation: NDArray[np.float64],
-    spheres: Listeners,
+    spheres: Receivers,
     limits: Limits,
     reach: float,
     seed: int,
 ) -> Record:
-    """Follow rays step by step to `reach` metres, and a part of them on to what is cut off."""
+    """Follow rays step by step to `reach` metres, and a part of them to `LATE_REACH` times it."""
     wanted = len(rays.position)
-    low, high = plan_bounds(room)
+    low, high = plan_bounds(sorted_surfaces)
     steps = max(1, round(reach / STEP))
     ends = np.linspace(0, reach, steps + 1)
     late = np.linspace(reach, LATE_REACH * reach, max(1, steps // 2) + 1)
-    ways = np.concatenate([ends, late[1:]])
+    bounds = np.concatenate([ends, late[1:]])
     parts: list[Record] = []
     size = _EVENTS_AT_ONCE
-    for step, (begin, end) in enumerate(pairwise(ways)):
+    for step, (begin, end) in enumerate(pairwise(bounds)):
         while True:
             moved = Rays(*(array.copy() for array in rays))  # type: ignore[arg-type]
             part = _empty_record(size)
             going, count = follow(
-                moved, begin, end, step, room, attenuation, spheres, limits, seed, part
+                moved, begin, end, step, sorted_surfaces, attenuation, spheres, limits, seed, part
             )
             if count >= 0:
                 break
@@ -177,7 +177,7 @@ def _follow_all(
 def trace(
     surfaces: Surfaces,
     source: NDArray[np.float64],
-    listeners: NDArray[np.float64],
+    receivers: NDArray[np.float64],
     rays: int = 10000,
     depth: int = 250,
     seconds: float = 0.6,
@@ -187,45 +187,51 @@ def trace(
     scattering: NDArray[np.float64] | None = None,
     air: bool = True,
 ) -> Events:
-    """Trace the reflections of one source for all listeners at once.
+    """Trace the reflections of one source to all receivers at once.
 
     Parameters
     ----------
     surfaces : Surfaces
-        What the rays meet.
+        Reflecting rectangles.
     source : array, shape (3,)
-        Metres.
-    listeners : array, shape (L, 3)
-        Centres of the spheres that receive; anywhere, they may overlap.
+        Position, metres.
+    receivers : array, shape (L, 3)
+        Centres of the receivers' spheres, metres; spheres may overlap.
     rays, depth : int
-        Number of rays, and after how many reflections one ends at the latest.
+        Number of rays, and the largest number of reflections of one.
     seconds : float
-        How long rays are followed.
+        Length of the responses, seconds.
     seed : int
-        Of all that is drawn; equal arguments give equal bytes.
+        Seed of all random draws; equal arguments give equal bytes.
     radius : float
-        Of the spheres, metres.
+        Radius of the spheres, metres.
     absorption, scattering : array, shape (len(surfaces.materials), 6), optional
-        Coefficients in place of those that `avn.acoustics.materials` gives for the names.
+        Coefficients in place of those of `avn.acoustics.materials`.
     air : bool
-        Whether air absorbs.
+        True for absorption by air.
 
     Returns
     -------
     Events
-        Without the direct sound.
+        Reflections alone; the direct sound is not among them.
     """
-    room = _sorted_room(surfaces, absorption, scattering)
-    centres = np.ascontiguousarray(listeners, dtype=np.float64).reshape(-1, 3)
+    sorted_surfaces = _sort_surfaces(surfaces, absorption, scattering)
+    centres = np.ascontiguousarray(receivers, dtype=np.float64).reshape(-1, 3)
     attenuation = materials.air_attenuation() if air else np.zeros(len(materials.BANDS))
     limits = Limits(depth, ENERGY_FLOOR / rays, WEIGHTED_REFLECTIONS)
     started = _start(np.asarray(source, dtype=np.float64), rays, seed)
-    spheres = sort_listeners(centres, radius)
-    who, distance, energy, arrival, sign = _follow_all(
-        started, room, attenuation, spheres, limits, seconds * materials.SPEED_OF_SOUND, seed
+    spheres = sort_receivers(centres, radius)
+    receiver, distance, energy, arrival, sign = _follow_all(
+        started,
+        sorted_surfaces,
+        attenuation,
+        spheres,
+        limits,
+        seconds * materials.SPEED_OF_SOUND,
+        seed,
     )
-    sorting = np.argsort(who, kind="stable")
-    counts = np.bincount(who, minlength=len(centres))
+    sorting = np.argsort(receiver, kind="stable")
+    counts = np.bincount(receiver, minlength=len(centres))
     return Events(
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
         distance=distance[sorting],

@@ -1,0 +1,1 @@
+"""Apartments: floor plans, their random generation, grids of cells, and surfaces."""

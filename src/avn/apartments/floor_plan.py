@@ -1,7 +1,7 @@
-"""The floor plan: what is built, in metres, from which everything else is derived.
+"""Floor plans of apartments, in metres, and their JSON format.
 
-The lattice of cells has its centres at (0.5 i, 0.5 j); walls are centred on lines of the
-lattice, so that a wall blocks a whole line of cells. x grows east, y north, z up.
+The centres of the lattice's cells are at (0.5 i, 0.5 j); walls are centred on lines of the
+lattice, so that a wall blocks a whole line of cells. x points east, y north, z up.
 Headings are 0 north, 1 east, 2 south, 3 west.
 """
 
@@ -42,9 +42,9 @@ class Room:
 
 @dataclass(frozen=True)
 class Doorway:
-    """A gap of 0.9 m in a wall; the centre is a lattice cell on the wall's line.
+    """A gap of 0.9 m in a wall; its centre (x, y) in metres is a lattice cell on the wall's line.
 
-    `along` is the axis that the wall runs along, "x" or "y".
+    `along` is the axis that the wall is parallel to, "x" or "y".
     """
 
     x: float
@@ -54,7 +54,10 @@ class Doorway:
 
 @dataclass(frozen=True)
 class Window:
-    """A pane in an outer wall: centre, axis of the wall, width, sill height and own height."""
+    """A window in an outer wall: centre, axis of the wall, width, height of the sill, height.
+
+    Lengths are in metres.
+    """
 
     x: float
     y: float
@@ -66,10 +69,10 @@ class Window:
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of furniture: its kind, centre, heading and the box it fills.
+    """A piece of furniture: its kind, centre, heading and bounding box, in metres.
 
-    `width` is measured across the way it faces and `depth` along it, so that with heading
-    1 or 3 the width lies along y. `z` is the height of its underside above the floor.
+    `depth` is measured in the direction of the heading and `width` across it, so that with
+    heading 1 or 3 the width is along y. `z` is the height of its underside above the floor.
     """
 
     kind: str
@@ -84,7 +87,7 @@ class Piece:
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """The footprint (x0, y0, x1, y1) in metres."""
+        """Footprint (x0, y0, x1, y1) in metres."""
         half_x, half_y = self.width / 2, self.depth / 2
         if self.heading % 2:
             half_x, half_y = half_y, half_x
@@ -93,7 +96,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Lamp:
-    """A lamp at a point of a room."""
+    """A lamp at a point of a room, metres."""
 
     x: float
     y: float
@@ -102,7 +105,7 @@ class Lamp:
 
 @dataclass(frozen=True)
 class FloorPlan:
-    """An apartment: rooms, openings, furniture, lamps and the places where sources stand.
+    """An apartment: rooms, openings, furniture, lamps and positions of sources.
 
     `sources` are (x, y) centres of free cells, in metres.
     """
@@ -116,11 +119,11 @@ class FloorPlan:
     sources: tuple[tuple[float, float], ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """The plan as plain lists and dicts, with the version of the format."""
+        """Convert the plan to lists and dicts, with the version of the format."""
         return {"format": FORMAT_VERSION, **dataclasses.asdict(self)}
 
     def to_json(self) -> str:
-        """The plan as JSON text; equal plans give equal bytes."""
+        """Convert the plan to JSON text; equal plans give equal bytes."""
         return json.dumps(self.to_dict(), indent=1, sort_keys=True) + "\n"
 
 
@@ -134,12 +137,19 @@ _PARTS = {
 
 
 def from_dict(data: dict[str, Any], origin: str = "floor plan") -> FloorPlan:
-    """Build a plan from what `FloorPlan.to_dict` gives.
+    """Build a plan from the result of `FloorPlan.to_dict`.
+
+    Parameters
+    ----------
+    data : dict
+        Lists and dicts, as read from JSON.
+    origin : str
+        Name of the file, for messages.
 
     Raises
     ------
     UserError
-        Where a key is missing, unknown or of another kind; `origin` names the file.
+        If a key is missing, unknown or of another type, or the plan is not valid.
     """
     if not isinstance(data, dict) or data.get("format") != FORMAT_VERSION:
         raise UserError(
@@ -156,14 +166,16 @@ def from_dict(data: dict[str, Any], origin: str = "floor plan") -> FloorPlan:
     for key in (*_PARTS, "sources"):
         if not isinstance(data[key], list | tuple):
             raise UserError(f"{origin}: '{key}' is no list; see docs/dataset.md")
-    for place in data["sources"]:
-        if not isinstance(place, list | tuple) or [_number(v) for v in place] != [True, True]:
-            raise UserError(f"{origin}: a source is {place!r}, not [x, y] in metres")
+    for point in data["sources"]:
+        if not isinstance(point, list | tuple) or [_number(v) for v in point] != [True, True]:
+            raise UserError(f"{origin}: a source is {point!r}, not [x, y] in metres")
     plan = FloorPlan(
         name=str(data["name"]),
         sources=tuple((float(x), float(y)) for x, y in data["sources"]),
         **{
-            key: tuple(_part(cls, own, f"{origin}: {key}[{i}]") for i, own in enumerate(data[key]))
+            key: tuple(
+                _part(cls, item, f"{origin}: {key}[{i}]") for i, item in enumerate(data[key])
+            )
             for key, cls in _PARTS.items()
         },
     )
@@ -172,7 +184,7 @@ def from_dict(data: dict[str, Any], origin: str = "floor plan") -> FloorPlan:
 
 
 def load(path: Path) -> FloorPlan:
-    """Read a plan from a JSON file; raises `UserError` with the file's name."""
+    """Read a plan from a JSON file; raise `UserError` with the file's name for a bad one."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -183,12 +195,12 @@ def load(path: Path) -> FloorPlan:
 
 
 def _part(cls: type, data: Any, where: str) -> Any:
-    """Build one part of a plan, such as a room, from what its JSON holds.
+    """Build one part of a plan, such as a room, from its JSON object.
 
     Raises
     ------
     UserError
-        Naming the part and the key that is missing, unknown or of another kind.
+        If a key is missing, unknown or of another type; the message names the part and the key.
     """
     if not isinstance(data, dict):
         raise UserError(f"{where}: is {data!r}, not an object with keys; see docs/dataset.md")
@@ -211,7 +223,7 @@ def _part(cls: type, data: Any, where: str) -> Any:
 
 
 def _number(value: Any) -> bool:
-    """Whether it is a number of metres within reach."""
+    """Return True for a finite number of at most `FARTHEST` metres."""
     return (
         isinstance(value, int | float)
         and not isinstance(value, bool)
@@ -221,7 +233,7 @@ def _number(value: Any) -> bool:
 
 
 def _check(plan: FloorPlan, origin: str) -> None:
-    """Raise `UserError` where rooms, openings, furniture or sources cannot be."""
+    """Raise `UserError` if rooms, openings, furniture or sources are not valid."""
 
     def on_lattice(*values: float) -> bool:
         return all(math.isclose(v / CELL, round(v / CELL), abs_tol=1e-6) for v in values)

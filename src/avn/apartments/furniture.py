@@ -1,9 +1,8 @@
-"""The catalogue: what furniture measures and is made of, and how pieces stand together.
+"""Catalogue of furniture: sizes, materials and groups of pieces.
 
-Sizes are those of common pieces of furniture, in metres. A `Group` is what is placed at once,
-such as a bed with its nightstands; it is described in a frame of its own: u runs to the right
-as seen by somebody who stands in the group and faces the way it faces, v the way it faces,
-and v = 0 is the wall.
+Sizes are those of common pieces of furniture, in metres. A `Group` is placed as a whole, such as
+a bed with its nightstands. It has a frame of its own: v points in the direction that the group
+faces, u to the right of it, and v = 0 is the wall.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ Rect = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Model:
-    """One piece of the catalogue: kind, size, material, height of its underside."""
+    """One piece of the catalogue: kind, size, material, height of its underside, in metres."""
 
     kind: str
     width: float
@@ -27,7 +26,7 @@ class Model:
 
 @dataclass(frozen=True)
 class Part:
-    """A model within a group: where its centre is and how many quarter turns it is turned."""
+    """A model within a group: centre (u, v) in metres and rotation in quarter turns."""
 
     model: Model
     u: float
@@ -45,21 +44,27 @@ class Part:
 
 @dataclass(frozen=True)
 class Group:
-    """Pieces that stand together and the places that must stay open to use them.
+    """Pieces that are placed together, and the floor that must stay free to use them.
+
+    Parameters
+    ----------
+    parts : tuple of Part
+        The pieces.
+    zones : tuple of Rect
+        Floor that no piece may stand on, u0, v0, u1, v1, metres.
+    corner, centre : float
+        Bonus in the score of a position in a corner, or at the middle of the wall.
+    corner_only : bool
+        True for groups that are placed in corners only.
+    against_wall : bool
+        False for groups that stand free in the room.
+    across : float
+        Distance from wall to wall that the group spans, metres; 0 if it does not.
 
     Attributes
     ----------
-    parts : tuple of Part
-    zones : tuple of Rect
-        Floor that no piece may stand on, u0, v0, u1, v1.
-    corner, centre : float
-        How much better a corner, or the middle of the wall, is than another place.
-    corner_only : bool
-        True for what is plumbed or pushed into a corner and looks lost elsewhere.
-    against_wall : bool
-        False for what stands free in the room.
-    across : float
-        Depth of the room from wall to wall that the group spans; 0 if it does not.
+    extent : Rect
+        Bounds of all parts, u0, v0, u1, v1, metres.
     """
 
     parts: tuple[Part, ...]
@@ -72,6 +77,7 @@ class Group:
     extent: Rect = field(init=False)
 
     def __post_init__(self) -> None:
+        """Compute the extent."""
         rects = [part.rect for part in self.parts]
         low = [min(r[i] for r in rects) for i in (0, 1)]
         high = [max(r[i] for r in rects) for i in (2, 3)]
@@ -116,7 +122,17 @@ def single(
     centre: float = 0.0,
     corner_only: bool = False,
 ) -> Group:
-    """A piece at a wall with open floor of depth `front` before it."""
+    """Return a group of one piece at a wall.
+
+    Parameters
+    ----------
+    model : Model
+        The piece.
+    front : float
+        Depth of the free floor in front of it, metres.
+    corner, centre, corner_only
+        As in `Group`.
+    """
     half = model.width / 2
     zone = (-half, model.depth, half, model.depth + front)
     zones = (zone,) if front > 0 else ()
@@ -124,7 +140,7 @@ def single(
 
 
 def bed_between_nightstands(bed: Model) -> Group:
-    """A double bed, headboard at the wall, a nightstand and a way in on either side."""
+    """Return a double bed, headboard at the wall, with a nightstand and access on both sides."""
     beside = bed.width / 2 + NIGHTSTAND.width / 2
     edge, way = bed.width / 2, bed.width / 2 + 0.55
     stands = [Part(NIGHTSTAND, side * beside, NIGHTSTAND.depth / 2) for side in (-1, 1)]
@@ -140,7 +156,7 @@ def bed_between_nightstands(bed: Model) -> Group:
 
 
 def bed_in_corner(bed: Model, side: int) -> Group:
-    """A bed that lies along a side wall too, with a nightstand on its open side (-1 or 1)."""
+    """Return a bed in a corner, with a nightstand on its open side (-1 or 1)."""
     stand = Part(NIGHTSTAND, side * (bed.width + NIGHTSTAND.width) / 2, NIGHTSTAND.depth / 2)
     way = sorted((side * bed.width / 2, side * (bed.width / 2 + 0.6)))
     return Group(
@@ -151,12 +167,12 @@ def bed_in_corner(bed: Model, side: int) -> Group:
 
 
 def wardrobe(width: float) -> Group:
-    """A wardrobe whose doors can be opened."""
+    """Return a wardrobe with free floor to open its doors."""
     return single(Model("wardrobe", width, 0.6, 2.1, "wood"), 0.6, corner=1.0)
 
 
 def desk_with_chair() -> Group:
-    """A desk at the wall and the chair before it, facing it."""
+    """Return a desk at the wall and a chair in front of it that faces the desk."""
     seat = DESK.depth + CHAIR.depth
     return Group(
         (Part(DESK, 0.0, DESK.depth / 2), Part(CHAIR, 0.0, seat - CHAIR.depth / 2, turn=2)),
@@ -166,9 +182,16 @@ def desk_with_chair() -> Group:
 
 
 def kitchen_run(counters: tuple[float, float], flipped: bool, cupboards: bool) -> Group:
-    """Fridge, counter, sink, counter and stove side by side along one wall.
+    """Return fridge, counter, sink, counter and stove side by side along one wall.
 
-    Wall cupboards hang over all but the fridge where `cupboards` is true.
+    Parameters
+    ----------
+    counters : (float, float)
+        Widths of the two counters, metres; 0 for none.
+    flipped : bool
+        True for the reverse order.
+    cupboards : bool
+        True for wall cupboards over all but the fridge.
     """
     first, second = (Model("counter", w, 0.6, 0.9, "laminate") for w in counters)
     row = [FRIDGE, first, SINK, second, STOVE]
@@ -194,7 +217,7 @@ def _seats(side_v: float, turn: int, count: int) -> list[Part]:
 
 
 def table_in_the_room(table: Model, seats: int) -> Group:
-    """A table that stands free, with `seats` (1 or 2) chairs on either long side facing it."""
+    """Return a free-standing table with `seats` (1 or 2) chairs on either long side."""
     beside = table.depth / 2 + CHAIR.depth / 2
     behind = table.depth / 2 + CHAIR.depth
     chairs = [*_seats(-beside, 0, seats), *_seats(beside, 2, seats)]
@@ -204,12 +227,12 @@ def table_in_the_room(table: Model, seats: int) -> Group:
 
 
 def table_at_the_wall(table: Model, seats: int) -> Group:
-    """A table with one end at the wall and `seats` chairs on its left and on its right."""
+    """Return a table with one end at the wall and `seats` chairs on either side."""
     beside = table.depth / 2 + CHAIR.depth / 2
     behind = table.depth / 2 + CHAIR.depth
     places = (table.width / 2,) if seats == 1 else (table.width / 2 - 0.28, table.width / 2 + 0.28)
     chairs = [Part(CHAIR, side * beside, v, 2 + side) for side in (-1, 1) for v in places]
-    # The table's long side lies along v: it is turned by a quarter.
+    # The table is rotated by a quarter turn: its long side is along v.
     return Group(
         (Part(table, 0.0, table.width / 2, turn=1), *chairs),
         (
@@ -221,9 +244,16 @@ def table_at_the_wall(table: Model, seats: int) -> Group:
 
 
 def sofa_and_television(width: float, across: float, coffee_table: bool) -> Group:
-    """A sofa at one wall, a television on its stand at the other, a coffee table between.
+    """Return a sofa at one wall and a television on its stand at the opposite one.
 
-    A sofa for two, at most 1.4 m wide, is a slim one.
+    Parameters
+    ----------
+    width : float
+        Width of the sofa, metres; up to 1.4 m it is a slim one for two.
+    across : float
+        Distance between the walls, metres.
+    coffee_table : bool
+        True for a coffee table between them.
     """
     depth = SLIM_SOFA_DEPTH if width <= 1.4 else SOFA_DEPTH
     sofa = Model("sofa", width, depth, 0.8, "upholstery")

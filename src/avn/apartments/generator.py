@@ -1,4 +1,4 @@
-"""From a seed to an apartment that one could live in."""
+"""Random generation of furnished apartments."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from avn.apartments.sources import spread_sources
 from avn.core.errors import UserError
 
 LAMP_HEIGHT = 2.35
-# Draws of rooms before a seed is given up; one in some fifty is a home.
+# Draws of layouts before the generator gives up; about one in fifty is valid.
 _DRAWS = 200_000
 _REFITS = 3
 
 
 @dataclass(frozen=True)
 class Size:
-    """How large and how full apartments are.
+    """Range of sizes and of the amount of furniture of apartments.
 
     Attributes
     ----------
     choices : tuple of (int, int, int)
-        Rooms, fewest and most grid squares; one is drawn.
+        Number of rooms, fewest and most grid squares; one choice is drawn.
     richness : (float, float)
-        How much furniture, from 0 (what one cannot do without) to 1.
+        Range of the amount of furniture, from 0 (the indispensable pieces) to 1.
     """
 
     choices: tuple[tuple[int, int, int], ...]
@@ -55,20 +55,16 @@ def generate(seed: int, name: str, sources: int = 5, size: str = "mixed") -> Flo
     seed : int
         The same seed, size and number of sources give the same apartment.
     name : str
-        What it is called.
+        Name of the apartment.
     sources : int
-        Places where a source may stand, spread over the rooms.
+        Number of source positions, spread over the rooms.
     size : str
         A key of `SIZES`.
-
-    Returns
-    -------
-    FloorPlan
 
     Raises
     ------
     UserError
-        For an unknown size, fewer than one source, or more than the apartment has room for.
+        If the size is unknown, or `sources` is below 1 or more than the apartment has room for.
     """
     if size not in SIZES:
         raise UserError(f"split.size is '{size}'; choose one of {', '.join(SIZES)}")
@@ -87,15 +83,15 @@ def generate(seed: int, name: str, sources: int = 5, size: str = "mixed") -> Flo
 
 
 def _furnish(plan: FloorPlan, richness: float, rng: np.random.Generator) -> FloorPlan | None:
-    """Furnish every room and check that the whole can be walked; None where it cannot."""
-    with_table = _room_to_eat_in(plan)
+    """Furnish every room; return None if a room cannot be furnished or cells are not connected."""
+    with_table = _dining_room(plan)
     pieces: list[Piece] = []
     bedrooms = [r for r in plan.rooms if r.kind == "bedroom"]
     main = max(bedrooms, key=lambda r: (r.x1 - r.x0) * (r.y1 - r.y0), default=None)
     for index, room in enumerate(plan.rooms):
         for _ in range(_REFITS):
             furnisher = Furnisher(plan, room, rng)
-            entered = index != _hub(plan) or _front_door(plan, furnisher)
+            entered = index != _entrance_room(plan) or _front_door(plan, furnisher)
             special = room is main if room.kind == "bedroom" else index == with_table
             if entered and FURNISH[room.kind](furnisher, richness, special):
                 break
@@ -111,14 +107,14 @@ def _furnish(plan: FloorPlan, richness: float, rng: np.random.Generator) -> Floo
     return plan
 
 
-def _hub(plan: FloorPlan) -> int:
-    """The room that one comes home to."""
+def _entrance_room(plan: FloorPlan) -> int:
+    """Return the index of the room with the front door."""
     kinds = [room.kind for room in plan.rooms]
     return kinds.index("living_room" if "living_room" in kinds else "kitchen")
 
 
-def _room_to_eat_in(plan: FloorPlan) -> int:
-    """The kitchen if a table and chairs go into it, else the living room."""
+def _dining_room(plan: FloorPlan) -> int:
+    """Return the index of the kitchen if a dining table fits into it, else of the living room."""
     kinds = [room.kind for room in plan.rooms]
     kitchen = plan.rooms[kinds.index("kitchen")]
     wide = min(kitchen.x1 - kitchen.x0, kitchen.y1 - kitchen.y0) >= 3.0
@@ -126,9 +122,9 @@ def _room_to_eat_in(plan: FloorPlan) -> int:
 
 
 def _front_door(plan: FloorPlan, furnisher: Furnisher) -> bool:
-    """Hang the front door into an outer wall of the room, and keep the floor before it free."""
+    """Put the front door into an outer wall of the room, and keep the floor before it free."""
     x0, y0, x1, y1 = furnisher.floor
-    room = plan.rooms[_hub(plan)]
+    room = plan.rooms[_entrance_room(plan)]
     door = Part(furniture.FRONT_DOOR, 0.0, furniture.FRONT_DOOR.depth / 2)
     half, thick = furniture.FRONT_DOOR.width / 2, WALL_THICKNESS / 2
     reach = furniture.FRONT_DOOR.depth + DOOR_CLEARANCE
@@ -143,7 +139,7 @@ def _front_door(plan: FloorPlan, furnisher: Furnisher) -> bool:
                 spot = Spot(inner, at, heading, 0.0)
             before = spot.place((-half, 0.0, half, reach))
             clash = any(overlap(before, zone) for zone in furnisher.zones)
-            if high - low > 1.2 and not clash and not furnisher.before_window(before):
+            if high - low > 1.2 and not clash and not furnisher.is_before_window(before):
                 spots.append((spot, before))
     if not spots:
         return False

@@ -1,4 +1,4 @@
-"""The grid of an apartment: free cells, moves between them, shortest walks."""
+"""Grid of an apartment: free cells, moves between them, shortest paths."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from avn.core.errors import UserError
 BODY_RADIUS = 0.2
 # North, east, south, west in lattice steps (x, y).
 STEPS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)], dtype=np.int32)
-# A disc that just touches is blocked, whatever the last digit of the sums is.
+# Tolerance, so that a disc that just touches is blocked regardless of rounding.
 _TOUCH = 1e-9
 
 
@@ -32,11 +32,11 @@ class Grid:
     neighbours : (C, 4) int32
         The cell that a move to the north, east, south, west leads to, or -1.
     distances : (C, C) int16
-        Moves of the shortest walk between two cells.
+        Length of the shortest path between two cells, in moves.
     rooms : (C,) int16
         Index into `plan.rooms`; a cell in a doorway belongs to the room with the lower index.
     squares : int
-        Grid squares counting those that furniture takes: inside the rooms and in doorways.
+        Number of grid squares inside the rooms and in doorways, occupied ones included.
     """
 
     lattice: NDArray[np.int32]
@@ -52,12 +52,12 @@ class Grid:
 
     @property
     def cells(self) -> int:
-        """How many free cells there are."""
+        """Number of free cells."""
         return len(self.lattice)
 
 
 def squares_of(plan: FloorPlan) -> tuple[NDArray[np.int32], NDArray[np.int16]]:
-    """Lattice squares within the rooms and in the doorways, free or not.
+    """List the lattice squares within the rooms and in the doorways, free or not.
 
     Returns
     -------
@@ -94,18 +94,19 @@ def squares_of(plan: FloorPlan) -> tuple[NDArray[np.int32], NDArray[np.int16]]:
 def touches(
     low: NDArray[np.float64], high: NDArray[np.float64], boxes: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Whether a disc of 0.2 m swept from `low` to `high` touches a box.
+    """Test a disc of 0.2 m, swept from `low` to `high`, for contact with any box.
 
     Parameters
     ----------
     low, high : (N, 2) float64
-        Ends of axis-aligned ways, `low` <= `high`, metres. Equal ends give the standing disc.
+        Ends of axis-aligned segments, `low` <= `high`, metres; equal ends for a disc at rest.
     boxes : (B, 4) float64
         Obstacles x0, y0, x1, y1, metres.
 
     Returns
     -------
     (N,) bool
+        True where the disc touches a box.
     """
     gap = np.maximum(boxes[None, :, :2] - high[:, None], low[:, None] - boxes[None, :, 2:])
     distance = np.hypot(*np.moveaxis(np.maximum(gap, 0.0), -1, 0))
@@ -115,13 +116,21 @@ def touches(
 def free_squares(
     lattice: NDArray[np.int32], boxes: NDArray[np.float64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
-    """Which squares are free among `boxes`, and where moves from the free ones lead.
+    """Find the free squares among obstacles, and their neighbours.
+
+    Parameters
+    ----------
+    lattice : (S, 2) int32
+        Lattice indices of the squares.
+    boxes : (B, 4) float64
+        Obstacles x0, y0, x1, y1, metres.
 
     Returns
     -------
     free : (S,) bool
+        True for free squares, F in all.
     neighbours : (F, 4) int32
-        Numbers among the free squares, or -1.
+        Index among the free squares to the north, east, south and west, or -1.
     """
     centres = lattice * np.float64(CELL)
     free = ~touches(centres, centres, boxes)
@@ -141,7 +150,7 @@ def free_squares(
 
 
 def moves_between(neighbours: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Moves of the shortest walk between all pairs, (C, C); inf where there is none."""
+    """Compute the shortest paths between all pairs in moves, (C, C); inf where there is none."""
     count = len(neighbours)
     start, heading = np.nonzero(neighbours >= 0)
     end = neighbours[start, heading]
@@ -152,14 +161,14 @@ def moves_between(neighbours: NDArray[np.int32]) -> NDArray[np.float64]:
 def build_grid(plan: FloorPlan) -> Grid:
     """Find the free cells of a plan and the moves between them.
 
-    A cell is free where a disc of 0.2 m round its centre touches neither wall nor furniture;
-    a move needs the swept disc free.
+    A cell is free if a disc of 0.2 m around its centre touches neither wall nor furniture. A move
+    is possible if the swept disc touches none.
 
     Raises
     ------
     UserError
-        Where no cell is free, the free cells are not connected, or a source of the plan does
-        not stand on a free cell.
+        If no cell is free, the free cells are not connected, or a source of the plan is not on a
+        free cell.
     """
     lattice, rooms = squares_of(plan)
     free, neighbours = free_squares(lattice, obstacles(plan))
@@ -184,12 +193,12 @@ def build_grid(plan: FloorPlan) -> Grid:
 
 
 def source_cells(plan: FloorPlan, grid: Grid) -> NDArray[np.int32]:
-    """The cells that the plan's sources stand on, (K,) int32.
+    """Return the cells of the plan's sources, (K,) int32.
 
     Raises
     ------
     UserError
-        Where a source does not stand on the centre of a free cell.
+        If a source is not at the centre of a free cell.
     """
     points = np.array(plan.sources, dtype=np.float64).reshape(-1, 2)
     near = np.abs(points[:, None] - grid.centres[None]) < 1e-6
@@ -204,12 +213,12 @@ def source_cells(plan: FloorPlan, grid: Grid) -> NDArray[np.int32]:
 
 
 def goal_cells(grid: Grid) -> NDArray[np.bool_]:
-    """The 3 x 3 cells around every cell that are at most two moves from it.
+    """Find the goal cells of a source on each cell: of 3 x 3 cells, those at most two moves away.
 
     Returns
     -------
     (C, C) bool
-        Row s tells which cells count as having reached a source on cell s.
+        Row s is True for the goal cells of a source on cell s.
     """
     offset = np.abs(grid.lattice[:, None] - grid.lattice[None]).max(axis=2)
     return np.asarray((offset <= 1) & (grid.distances <= 2))

@@ -1,4 +1,4 @@
-"""Rooms, doorways and windows of an apartment, drawn at random, before it is furnished."""
+"""Random layouts of apartments: rooms, doorways and windows."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Edge = tuple[int, int]
 
 @dataclass(frozen=True)
 class Measure:
-    """What a kind of room measures: sides in half metres between wall lines, and squares."""
+    """Size limits of a kind of room: sides in half metres between wall lines, and grid squares."""
 
     short: tuple[int, int]
     long: tuple[int, int]
     squares: tuple[int, int]
 
     def fits(self, rect: Rect) -> bool:
-        """Whether a room of this kind may have this shape."""
+        """Return True if a room of this kind may have this shape."""
         short, long = sorted((rect[2] - rect[0], rect[3] - rect[1]))
         return (
             self.short[0] <= short <= self.short[1]
@@ -48,8 +48,8 @@ FINISH = {
     "bedroom": (("parquet", "carpet"), ("plaster",)),
     "living_room": (("parquet", "parquet", "carpet"), ("plaster", "plaster", "painted_brick")),
 }
-# How odd a door between two kinds of room would be; a pair that is not named has none.
-ODDITY = {
+# Cost of a door between two kinds of room; other pairs never have one.
+DOOR_COST = {
     ("kitchen", "living_room"): 0.0,
     ("bedroom", "living_room"): 0.0,
     ("bathroom", "living_room"): 1.0,
@@ -67,14 +67,14 @@ WINDOWS = {
 
 
 def _split(rects: list[Rect], leaves: int, rng: np.random.Generator) -> list[Rect] | None:
-    """Cut a rectangle into `leaves` rectangles of at least 2 m a side, wall to wall."""
+    """Split a rectangle at random into `leaves` rectangles with sides of at least 2 m."""
     while len(rects) < leaves:
         weights = [((r[2] - r[0]) * (r[3] - r[1])) ** 2 for r in rects]
-        chosen, drawn = 0, rng.random() * sum(weights)
-        while drawn > weights[chosen]:
-            drawn -= weights[chosen]
-            chosen += 1
-        x0, y0, x1, y1 = rects.pop(chosen)
+        index, drawn = 0, rng.random() * sum(weights)
+        while drawn > weights[index]:
+            drawn -= weights[index]
+            index += 1
+        x0, y0, x1, y1 = rects.pop(index)
         wide = x1 - x0 > y1 - y0 if rng.random() < 0.8 else x1 - x0 <= y1 - y0
         low, high = (x0 + 4, x1 - 4) if wide else (y0 + 4, y1 - 4)
         if low > high:
@@ -90,7 +90,7 @@ def _corner(rect: Rect, width: int, height: int) -> bool:
 
 
 def _shapes(count: int, squares: tuple[int, int], rng: np.random.Generator) -> list[Rect] | None:
-    """Rectangles that tile a rectangle or an L, or None where the draw does not fit."""
+    """Draw rectangles that tile a rectangle or an L; return None if the draw does not fit."""
     l_shaped = bool(rng.random() < 0.5)
     # Walls take about a quarter of all squares, and the corner left out of an L some more.
     area = rng.integers(squares[0], squares[1] + 1) * (1.5 if l_shaped else 1.3)
@@ -102,7 +102,7 @@ def _shapes(count: int, squares: tuple[int, int], rng: np.random.Generator) -> l
     if l_shaped:
         corners = [r for r in rects if _corner(r, width, height)]
         left_out = corners[int(rng.integers(len(corners)))]
-        # An L wants both its legs: the corner left out spans neither side of the house.
+        # The corner that is left out must not span a whole side, else the rest is no L.
         if left_out[2] - left_out[0] == width or left_out[3] - left_out[1] == height:
             return None
         rects = [r for r in rects if r != left_out]
@@ -120,7 +120,7 @@ def _kinds(rects: list[Rect], rng: np.random.Generator) -> list[str] | None:
     )
     if not fitting:
         return None
-    # The living room is the largest room of a home.
+    # The living room must be the largest room.
     sizes = [(r[2] - r[0] - 1) * (r[3] - r[1] - 1) for r in rects]
     best = [
         o for o in fitting if "living_room" not in o or sizes[o.index("living_room")] == max(sizes)
@@ -129,7 +129,7 @@ def _kinds(rects: list[Rect], rng: np.random.Generator) -> list[str] | None:
 
 
 def _shared(a: Rect, b: Rect) -> tuple[str, int, int, int] | None:
-    """The wall that two rooms share: axis it runs along, its line, and its span."""
+    """Return the wall that two rooms share: axis parallel to it, offset, and span; else None."""
     for along, p, q in (("y", 0, 1), ("x", 1, 0)):
         for line in {a[p], a[p + 2]} & {b[p], b[p + 2]}:
             low, high = max(a[q], b[q]), min(a[q + 2], b[q + 2])
@@ -139,34 +139,36 @@ def _shared(a: Rect, b: Rect) -> tuple[str, int, int, int] | None:
 
 
 def _trees(count: int, edges: list[Edge]) -> list[tuple[Edge, ...]]:
-    """All ways to join the rooms without a loop."""
+    """List all spanning trees of the rooms."""
     trees = []
-    for chosen in combinations(edges, count - 1):
+    for tree in combinations(edges, count - 1):
         group = list(range(count))
-        for a, b in chosen:
+        for a, b in tree:
             group = [group[a] if g == group[b] else g for g in group]
         if len(set(group)) == 1:
-            trees.append(chosen)
+            trees.append(tree)
     return trees
 
 
-def _oddity(tree: tuple[Edge, ...], kinds: list[str]) -> float:
-    """How odd the ways through an apartment are; inf where nobody would build it."""
+def _layout_cost(tree: tuple[Edge, ...], kinds: list[str]) -> float:
+    """Sum the cost of a tree of doors; inf for one that is not plausible."""
     degree = np.bincount(np.array(tree).ravel(), minlength=len(kinds))
-    odd = 0.0
+    cost = 0.0
     for a, b in tree:
         pair = (min(kinds[a], kinds[b]), max(kinds[a], kinds[b]))
-        if pair not in ODDITY or (pair == ("bathroom", "bedroom") and kinds.count("bedroom") > 1):
+        if pair not in DOOR_COST or (
+            pair == ("bathroom", "bedroom") and kinds.count("bedroom") > 1
+        ):
             return np.inf
-        odd += ODDITY[pair]
+        cost += DOOR_COST[pair]
     for room, kind in enumerate(kinds):
         if kind == "bathroom" and degree[room] > 1:
             return np.inf
-        # Nobody walks through a bedroom, unless to a bath of its own.
+        # A bedroom is no passage, except to a bathroom of its own.
         beyond = [kinds[b if a == room else a] for a, b in tree if room in (a, b)]
         if kind == "bedroom" and sum(other != "bathroom" for other in beyond) > 1:
             return np.inf
-    return odd if odd <= 3.5 else np.inf
+    return cost if cost <= 3.5 else np.inf
 
 
 def _doorways(
@@ -177,14 +179,16 @@ def _doorways(
         for a, b in combinations(range(len(rects)), 2)
         if (wall := _shared(rects[a], rects[b])) is not None
     }
-    ranked = [(_oddity(t, kinds) + rng.random(), t) for t in _trees(len(rects), sorted(shared))]
-    ranked = [(odd, tree) for odd, tree in ranked if np.isfinite(odd)]
+    ranked = [
+        (_layout_cost(t, kinds) + rng.random(), t) for t in _trees(len(rects), sorted(shared))
+    ]
+    ranked = [(cost, tree) for cost, tree in ranked if np.isfinite(cost)]
     if not ranked:
         return None
     doors = []
     for edge in min(ranked)[1]:
         along, line, low, high = shared[edge]
-        # Doors stand near a corner, so that a wall is left whole for furniture.
+        # Doors are near a corner, so that the rest of the wall is left for furniture.
         spots = [s for s in {low + 1, low + 2, high - 2, high - 1} if low < s < high]
         spot = sorted(spots)[int(rng.integers(len(spots)))]
         x, y = (spot, line) if along == "x" else (line, spot)
@@ -193,9 +197,9 @@ def _doorways(
 
 
 def outer_spans(room: Room, rooms: tuple[Room, ...]) -> list[tuple[str, float, float, float]]:
-    """Parts of a room's walls that face outside: axis, line, from, to; metres.
+    """Find the parts of a room's walls that face outside: axis, offset, start, end; metres.
 
-    Rooms are tiled without overlap, so a part is outer where no other room has that wall.
+    Rooms tile the apartment without overlap, so a part is outer if no other room has that wall.
     """
     spans = []
     sides = (
@@ -243,16 +247,18 @@ def draw_layout(
     Parameters
     ----------
     name : str
+        Name of the apartment.
     count : int
-        Rooms, 3 to 5.
+        Number of rooms, 3 to 5.
     squares : (int, int)
         Fewest and most grid squares of the whole apartment.
     rng : Generator
+        Random numbers.
 
     Returns
     -------
     FloorPlan or None
-        Without furniture, lamps and sources; None where the draw is no home.
+        Without furniture, lamps and sources; None if the draw is not valid.
     """
     rects = _shapes(count, squares, rng)
     kinds = _kinds(rects, rng) if rects is not None else None

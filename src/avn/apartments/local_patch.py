@@ -13,7 +13,7 @@ SIDE = WINDOW // 2
 
 
 def window_offsets() -> NDArray[np.int32]:
-    """Where the cells of the window lie, (5, 5, 2) int32: cells to the right and to the front.
+    """Return the offsets of the window's cells, (5, 5, 2) int32: cells to the right and front.
 
     Row 0 is the nearest, column 0 the leftmost.
     """
@@ -22,7 +22,7 @@ def window_offsets() -> NDArray[np.int32]:
 
 
 def window_cells(grid: Grid) -> NDArray[np.int32]:
-    """The free cells of the window of every state.
+    """Find the free cells in the window of every state.
 
     Parameters
     ----------
@@ -32,8 +32,8 @@ def window_cells(grid: Grid) -> NDArray[np.int32]:
     Returns
     -------
     (4 C, 5, 5) int32
-        Cell, or -1 where the square is not free. Row r is r + 1 cells ahead, column c is c - 2
-        cells to the right.
+        Index of the cell, or -1 where the square is not free. Row r is r + 1 cells ahead, column
+        c is c - 2 cells to the right. The state is 4 x cell + heading.
     """
     lattice, offsets = grid.lattice, window_offsets()
     low = lattice.min(axis=0) - WINDOW

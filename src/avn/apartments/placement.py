@@ -1,4 +1,4 @@
-"""Putting groups of furniture into a room so that it can be lived in."""
+"""Placement of groups of furniture in a room, with all free floor connected."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from avn.apartments.floor_plan import CELL, DOOR_WIDTH, WALL_THICKNESS, FloorPla
 from avn.apartments.furniture import Group, Part, Rect
 from avn.apartments.grid import free_squares
 
-# Floor before a doorway that stays free: the leaf's way on either side of the wall.
+# Depth of the free floor on either side of a doorway, for the leaf of the door; metres.
 DOOR_CLEARANCE = 0.9
-# Way of moving in the directions north, east, south, west.
+# Unit vectors of the headings north, east, south, west.
 FORWARD = ((0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0))
 _TOUCH = 1e-6
-# Places of a group that are tried before it is given up.
+# Positions of a group that are tried for connected free floor.
 _TRIES = 12
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Where a group may stand: the world point of (u, v) = (0, 0) and the way it faces."""
+    """Candidate pose of a group: world point of (u, v) = (0, 0) in metres, heading and score."""
 
     x: float
     y: float
@@ -33,14 +33,14 @@ class Spot:
     score: float
 
     def place(self, rect: Rect) -> Rect:
-        """A rectangle of the group's frame in the world's."""
+        """Transform a rectangle from the group's frame to the world's."""
         right, front = FORWARD[(self.heading + 1) % 4], FORWARD[self.heading]
         xs = [self.x + u * right[0] + v * front[0] for u, v in (rect[:2], rect[2:])]
         ys = [self.y + u * right[1] + v * front[1] for u, v in (rect[:2], rect[2:])]
         return min(xs), min(ys), max(xs), max(ys)
 
     def piece(self, part: Part) -> Piece:
-        """A part of the group as a piece of the floor plan; rounded to a tenth of a mm."""
+        """Convert a part of the group to a piece of the floor plan, rounded to 0.1 mm."""
         x0, y0, x1, y1 = self.place(part.rect)
         model = part.model
         return Piece(
@@ -57,14 +57,14 @@ class Spot:
 
 
 def overlap(a: Rect, b: Rect) -> bool:
-    """Whether two rectangles share more than an edge."""
+    """Return True if two rectangles share more than an edge."""
     low_x, low_y = max(a[0], b[0]), max(a[1], b[1])
     high_x, high_y = min(a[2], b[2]), min(a[3], b[3])
     return high_x - low_x > _TOUCH and high_y - low_y > _TOUCH
 
 
 def inside(a: Rect, b: Rect) -> bool:
-    """Whether rectangle `a` lies within `b`."""
+    """Return True if rectangle `a` is within `b`."""
     return (
         a[0] > b[0] - _TOUCH
         and a[1] > b[1] - _TOUCH
@@ -74,14 +74,16 @@ def inside(a: Rect, b: Rect) -> bool:
 
 
 class Furnisher:
-    """A room being furnished: what stands in it and what must stay open.
+    """A room that is being furnished: its pieces, and the zones that must stay free.
 
     Parameters
     ----------
     plan : FloorPlan
-        Its doorways and windows are respected; its furniture is not looked at.
+        Doorways and windows keep floor free; furniture of the plan is ignored.
     room : Room
+        Room of the plan.
     rng : Generator
+        Random numbers.
     """
 
     def __init__(self, plan: FloorPlan, room: Room, rng: np.random.Generator) -> None:
@@ -94,7 +96,7 @@ class Furnisher:
         self._squares = self._room_squares(plan, room)
 
     def _panes(self, plan: FloorPlan) -> list[tuple[Rect, float]]:
-        """The floor before each window of the room, 0.35 m deep, and the height of its sill."""
+        """Return the floor before each window of the room, 0.35 m deep, and its sill's height."""
         panes = []
         for window in plan.windows:
             a, b = window.width / 2, WALL_THICKNESS / 2 + 0.35
@@ -119,18 +121,18 @@ class Furnisher:
         return np.concatenate(squares).astype(np.int32)
 
     def _wall(self, heading: int) -> tuple[float, float, float]:
-        """Left end (x, y) and length of the wall that faces `heading`, as seen facing that way."""
+        """Return the left end (x, y) and length of the wall behind a group that faces `heading`."""
         x0, y0, x1, y1 = self.floor
         corner = ((x0, y0), (x0, y1), (x1, y1), (x1, y0))[heading]
         return *corner, (y1 - y0) if heading % 2 else (x1 - x0)
 
     def across(self, heading: int) -> float:
-        """Depth of the room in the direction `heading`, metres."""
+        """Return the depth of the room in the direction `heading`, metres."""
         x0, y0, x1, y1 = self.floor
         return x1 - x0 if heading % 2 else y1 - y0
 
-    def before_window(self, rect: Rect) -> bool:
-        """Whether a rectangle lies before a window of the room."""
+    def is_before_window(self, rect: Rect) -> bool:
+        """Return True if a rectangle is before a window of the room."""
         return any(overlap(rect, pane) for pane, _ in self._walls_with_windows)
 
     def _spots_at_walls(self, group: Group) -> list[Spot]:
@@ -149,12 +151,12 @@ class Furnisher:
                 edges += [room / 2, *np.arange(0.25, room, 0.25)]
             for at in sorted({round(max(edge, 0.0), 4) for edge in edges}):
                 shift = at - centre
-                score = self._taste(group, at, room) + self.rng.random()
+                score = self._wall_score(group, at, room) + self.rng.random()
                 spots.append(Spot(x + shift * right[0], y + shift * right[1], heading, score))
         return spots
 
-    def _taste(self, group: Group, at: float, room: float) -> float:
-        """Corners and middles that suit the group; gaps too narrow to sweep do not."""
+    def _wall_score(self, group: Group, at: float, room: float) -> float:
+        """Score a position along a wall: bonuses of the group, minus gaps of less than 0.45 m."""
         gaps = (at, room - at)
         score = group.corner * (min(gaps) < _TOUCH)
         score -= 1.5 * sum(_TOUCH < gap < 0.45 for gap in gaps)
@@ -174,7 +176,7 @@ class Furnisher:
         return spots
 
     def _fits(self, group: Group, spot: Spot) -> list[Piece] | None:
-        """The group's pieces at a spot, or None where something is in the way."""
+        """Return the group's pieces at a spot, or None if they collide with anything."""
         pieces = [spot.piece(part) for part in group.parts]
         zones = [spot.place(zone) for zone in group.zones]
         standing = [piece.bounds for piece in self.pieces]
@@ -191,7 +193,7 @@ class Furnisher:
         return pieces
 
     def _walkable(self, pieces: Sequence[Piece], zones: Sequence[Rect]) -> bool:
-        """Whether all free squares hang together and lead to every zone and chair."""
+        """Return True if all free squares are connected, with one at every zone and chair."""
         boxes = np.array([piece.bounds for piece in pieces], dtype=np.float64).reshape(-1, 4)
         free, neighbours = free_squares(self._squares, boxes)
         start, heading = np.nonzero(neighbours >= 0)
@@ -212,7 +214,7 @@ class Furnisher:
         return True
 
     def add(self, group: Group) -> bool:
-        """Put a group at the best of some random places; False where it fits nowhere."""
+        """Place a group at the valid spot of the highest score; return False if there is none."""
         spots = (
             self._spots_at_walls(group) if group.against_wall else self._spots_in_the_room(group)
         )

@@ -1,4 +1,4 @@
-"""What belongs into each kind of room, from what it cannot do without to what is nice."""
+"""Furnishing of each kind of room: indispensable pieces first, then optional ones."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from avn.apartments import furniture as f
 from avn.apartments.furniture import Group, Model
 from avn.apartments.placement import Furnisher
 
-# Widest living room across which a television is watched, metres.
+# Largest distance from wall to wall between a sofa and a television, metres.
 _VIEWING = 4.6
-# Homes of less richness than this are furnished by people who like empty floors.
+# Apartments of less richness than this have small furniture and few optional pieces.
 LEAN = 0.1
 
 
 def _pick(rng: np.random.Generator, *options: Group) -> list[Group]:
-    """The options in random order, to be tried until one fits."""
+    """Shuffle the options, to be tried until one fits."""
     return [options[i] for i in rng.permutation(len(options))]
 
 
@@ -34,7 +34,22 @@ def _maybe(room: Furnisher, groups: list[Group], chance: float) -> bool:
 
 
 def furnish_bedroom(room: Furnisher, richness: float, main: bool) -> bool:
-    """A bed, a wardrobe, and as the room allows a desk, a dresser, shelves."""
+    """Furnish a bedroom: a bed, a wardrobe, and if they fit a desk, a dresser, shelves, a plant.
+
+    Parameters
+    ----------
+    room : Furnisher
+        The room.
+    richness : float
+        Amount of furniture, 0 to 1.
+    main : bool
+        True for the largest bedroom, which has a double bed.
+
+    Returns
+    -------
+    bool
+        False if an indispensable piece does not fit.
+    """
     rng = room.rng
     doubles = [
         f.bed_between_nightstands(f.DOUBLE_BED),
@@ -64,7 +79,22 @@ def furnish_bedroom(room: Furnisher, richness: float, main: bool) -> bool:
 
 
 def furnish_kitchen(room: Furnisher, richness: float, dining: bool) -> bool:
-    """Fridge, sink and stove in one run, and a table where one is eaten at."""
+    """Furnish a kitchen: fridge, sink and stove in one run, a dining table, optional pieces.
+
+    Parameters
+    ----------
+    room : Furnisher
+        The room.
+    richness : float
+        Amount of furniture, 0 to 1.
+    dining : bool
+        True if the dining table of the apartment has to be here.
+
+    Returns
+    -------
+    bool
+        False if an indispensable piece does not fit.
+    """
     rng = room.rng
     runs = []
     for counters in ((1.2, 1.2), (0.6, 1.2), (0.6, 0.6), (0.0, 0.6), (0.0, 0.0)):
@@ -88,7 +118,22 @@ def furnish_kitchen(room: Furnisher, richness: float, dining: bool) -> bool:
 
 
 def furnish_living_room(room: Furnisher, richness: float, dining: bool) -> bool:
-    """A sofa that faces a television, shelves, and a table where the kitchen has none."""
+    """Furnish a living room: a sofa that faces a television, a dining table, optional pieces.
+
+    Parameters
+    ----------
+    room : Furnisher
+        The room.
+    richness : float
+        Amount of furniture, 0 to 1.
+    dining : bool
+        True if the dining table of the apartment has to be here.
+
+    Returns
+    -------
+    bool
+        False if an indispensable piece does not fit.
+    """
     rng = room.rng
     widths = (2.1, 1.8, 1.6) if richness > 0.35 else (1.6,) if richness >= LEAN else (1.4,)
     depths = sorted({round(room.across(h), 4) for h in range(4) if room.across(h) <= _VIEWING})
@@ -120,7 +165,22 @@ def furnish_living_room(room: Furnisher, richness: float, dining: bool) -> bool:
 
 
 def furnish_bathroom(room: Furnisher, richness: float, dining: bool) -> bool:
-    """A toilet, a basin, and a tub or a shower."""
+    """Furnish a bathroom: a toilet, a basin, a tub or a shower, and optional pieces.
+
+    Parameters
+    ----------
+    room : Furnisher
+        The room.
+    richness : float
+        Amount of furniture, 0 to 1.
+    dining : bool
+        Ignored.
+
+    Returns
+    -------
+    bool
+        False if an indispensable piece does not fit.
+    """
     del dining
     rng = room.rng
     tub, shower = (f.single(model, 0.5, corner_only=True) for model in (f.BATHTUB, f.SHOWER))

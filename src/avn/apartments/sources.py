@@ -1,4 +1,4 @@
-"""Where sources stand."""
+"""Random positions of sound sources."""
 
 from __future__ import annotations
 
@@ -9,30 +9,40 @@ from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import Grid, goal_cells
 from avn.core.errors import UserError
 
-# Nearest that two sources stand, metres, where there is room for it.
+# Least distance between two sources where cells allow it, metres.
 APART = 1.5
-# Cells of the nine around a source, itself among them, that can be walked to at once.
+# Wanted number of goal cells of a source, out of nine.
 _OPEN = 8
 
 
 def spread_sources(
     plan: FloorPlan, grid: Grid, count: int, rng: np.random.Generator
 ) -> list[tuple[float, float]]:
-    """Choose cells for sources: in every room if there are enough, far from one another.
+    """Draw cells for sources: in every room if there are enough, far from one another.
 
-    They stand on open floor, most of the 3 x 3 cells around them free, so that an apartment
-    is hard for its walls and not for a nook that its source hides in. Cells in a doorway, or
-    right before one, are left out.
+    Most of the 3 x 3 cells around a source are free, so that walls and not narrow niches make an
+    episode hard. Cells in a doorway, or next to one, are left out.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+        The apartment.
+    grid : Grid
+        Its cells.
+    count : int
+        Number of sources.
+    rng : Generator
+        Random numbers.
 
     Returns
     -------
     list of (x, y)
-        Centres of `count` free cells, metres, from room to room.
+        Centres of `count` free cells, metres, in ascending order of the cell's index.
 
     Raises
     ------
     UserError
-        Where the apartment has fewer such cells than `count`.
+        If the apartment has fewer such cells than `count`.
     """
     doors = np.array([(d.x, d.y) for d in plan.doorways]).reshape(-1, 2)
     away = np.abs(grid.centres[:, None] - doors[None]).max(axis=2, initial=0) > 0.6
@@ -52,16 +62,16 @@ def spread_sources(
 
 
 def _rooms_for_sources(plan: FloorPlan, rooms: NDArray[np.int16], count: int) -> list[int]:
-    """The room of each source: one for every room first, then by how many cells it has.
+    """Return the room of each source: one in every room first, then by the rooms' cells.
 
-    A bathroom is left out of the first round unless there are two sources a room.
+    A bathroom is left out of the first round unless there are two sources for every room.
     """
     cells = np.bincount(rooms, minlength=len(plan.rooms))
     small = np.array([room.kind == "bathroom" for room in plan.rooms])
     first = (cells > 0) & (~small | (count >= 2 * len(plan.rooms)))
     given = np.zeros(len(cells), dtype=int)
     for _ in range(count):
-        # The room with most cells a source, that still has a cell to give.
+        # The room with most cells for each source, among those with a cell left.
         share = np.where(given < cells, cells / (given + 1), -1.0)
         waiting = first & (given == 0)
         given[int(np.where(waiting, share, share * ~waiting.any()).argmax())] += 1
@@ -75,7 +85,7 @@ def _choose(
     openness: NDArray[np.int64],
     rng: np.random.Generator,
 ) -> int:
-    """A random cell that is far enough from what is chosen and stands open, if there is one."""
+    """Draw a cell far enough from the chosen ones and with free cells around it, if any."""
     nearest = np.full(len(cells), np.inf)
     if chosen:
         apart = np.linalg.norm(grid.centres[cells][:, None] - grid.centres[chosen][None], axis=2)

@@ -1,4 +1,4 @@
-"""Which apartments train, validate and test."""
+"""Splits of apartments into training, validation and test."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from avn.core.errors import UserError
 
 PARTS = ("train", "validation", "test")
 FROZEN = Path(__file__).parents[1] / "assets" / "floor_plans"
-# Seeds looked through for one apartment before its likes are said to be exhausted.
-_LOOK = 200
+# Seeds that are tried for one apartment of a new layout.
+_ATTEMPTS = 200
 
 
 @dataclass
 class SplitConfig:
-    """The config group `split`.
+    """Settings of the config group `split`.
 
     Attributes
     ----------
     name : str
-        Name of the split, as runs have it.
+        Name of the split, as in the names of runs.
     folder : str, optional
         Frozen floor plans: a folder under the package's `assets/floor_plans`, or any folder.
         Files `train_*.json`, `val_*.json`; all others are test apartments.
     seed : int
-        First seed of the generator, where there is no folder.
+        First seed of the generator; ignored with a folder.
     size : str
         Size of generated apartments, a key of `avn.apartments.generator.SIZES`.
     train, validation, test : int
-        How many apartments are generated. With a folder they are not looked at.
+        Number of apartments to generate; ignored with a folder.
     train_sources, sources : int
-        Source cells of each training apartment, and of each other.
+        Number of source cells of each training apartment, and of each other one.
     """
 
     name: str = "var"
@@ -54,26 +54,28 @@ def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
     Parameters
     ----------
     cfg : SplitConfig
+        Settings.
 
     Returns
     -------
     dict of list of FloorPlan
         Under `train`, `validation` and `test`; a folder may have apartments of some parts only.
-        No layout occurs twice, turned or mirrored ones included, among generated apartments.
+        Layouts of generated apartments are unique, also up to rotation and mirroring.
 
     Raises
     ------
     UserError
-        Where there is no apartment, a file or folder is missing or broken, or a number is wrong.
+        If there is no apartment, a file or folder is missing or not valid, or a number is out of
+        range.
     """
     return _generated(cfg) if cfg.folder is None else _frozen(cfg.folder)
 
 
-def _frozen(where: str) -> dict[str, list[FloorPlan]]:
-    folder = FROZEN / where
-    folder = folder if folder.is_dir() else Path(where).expanduser()
+def _frozen(name: str) -> dict[str, list[FloorPlan]]:
+    folder = FROZEN / name
+    folder = folder if folder.is_dir() else Path(name).expanduser()
     if not folder.is_dir():
-        raise UserError(f"split.folder: there is no folder {where}; give one with floor plans")
+        raise UserError(f"split.folder: there is no folder {name}; give one with floor plans")
     split: dict[str, list[FloorPlan]] = {part: [] for part in PARTS}
     for path in sorted(folder.glob("*.json")):
         plan = load(path)
@@ -82,7 +84,7 @@ def _frozen(where: str) -> dict[str, list[FloorPlan]]:
         part = {"train": "train", "val": "validation"}.get(path.stem.split("_")[0], "test")
         split[part].append(plan)
     if not any(split.values()):
-        raise UserError(f"split.folder: no floor plan in {where}; add one, such as room_1.json")
+        raise UserError(f"split.folder: no floor plan in {name}; add one, such as room_1.json")
     return split
 
 
@@ -101,7 +103,7 @@ def _generated(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
     for part in PARTS:
         sources = cfg.train_sources if part == "train" else cfg.sources
         for number in range(1, getattr(cfg, part) + 1):
-            for _ in range(_LOOK):
+            for _ in range(_ATTEMPTS):
                 plan = generate(seed, f"{names[part]}_{number}", sources, cfg.size)
                 seed += 1
                 if layout_key(plan) not in seen:

@@ -1,7 +1,7 @@
-"""Surfaces: the axis-aligned rectangles that sound and light meet.
+"""Surfaces of an apartment: the axis-aligned rectangles that reflect sound and light.
 
-The air of an apartment is a union of boxes: one a room and one a doorway. What bounds that
-union, less openings and plus furniture, is what is listed here, so that no ray finds a gap.
+The air of an apartment is a union of boxes: one for each room and one for each doorway. The
+surfaces are the boundary of that union, minus openings, plus furniture, so that there are no gaps.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ DOOR_FRAME = "wood"
 PANE = "glass"
 BUILDING = -1
 _SLIVER = 1e-6
-# Parameters of a line so close to its ends count as the ends themselves.
+# Tolerance of the line parameter at the two ends of a line of sight.
 _ENDS = 1e-9
 
 
@@ -46,17 +46,17 @@ class Surfaces:
     Attributes
     ----------
     axis : (Q,) int8
-        The axis of the normal: 0 x, 1 y, 2 z.
+        Axis of the normal: 0 x, 1 y, 2 z.
     offset : (Q,) float64
-        Where the rectangle lies on that axis, metres.
+        Position of the rectangle on that axis, metres.
     lower, upper : (Q, 2) float64
-        Its bounds on the two other axes in ascending order of axis, metres.
+        Bounds on the two other axes in ascending order of axis, metres.
     material : (Q,) int16
         Index into `materials`.
     piece : (Q,) int16
-        Index of the piece of furniture it belongs to; -1 for the building.
+        Index of the piece of furniture; -1 for the building.
     materials : tuple of str
-        Names known to `avn.acoustics.materials`.
+        Names of `avn.acoustics.materials`.
     """
 
     axis: NDArray[np.int8]
@@ -69,7 +69,7 @@ class Surfaces:
 
 
 def _subtract(rect: Rect, hole: Rect) -> list[Rect]:
-    """What is left of a rectangle (low, low, high, high) without a hole: at most four."""
+    """Subtract a hole from a rectangle (low, low, high, high): at most four rectangles."""
     a0, b0, a1, b1 = rect
     h0, i0, h1, i1 = max(a0, hole[0]), max(b0, hole[1]), min(a1, hole[2]), min(b1, hole[3])
     if h1 - h0 < _SLIVER or i1 - i0 < _SLIVER:
@@ -90,7 +90,7 @@ def _interior(room: Room) -> Rect:
 
 
 def _hole(opening: Doorway | Window, wall: tuple[str, float]) -> Rect | None:
-    """The part of a wall (axis it runs along, its line) that an opening takes: along, height."""
+    """Return the hole of an opening in a wall (axis, offset): bounds along it and in height."""
     across, centre = (opening.y, opening.x) if opening.along == "x" else (opening.x, opening.y)
     if opening.along != wall[0] or abs(across - wall[1]) > _SLIVER:
         return None
@@ -125,7 +125,7 @@ def _room_quads(room: Room, plan: FloorPlan) -> list[Quad]:
 
 
 def _doorway_quads(door: Doorway, plan: FloorPlan) -> list[Quad]:
-    """The two jambs, the lintel and the threshold of a doorway."""
+    """Return the two jambs, the lintel and the threshold of a doorway."""
     half, thick = DOOR_WIDTH / 2, WALL_THICKNESS / 2
     jamb_axis = 0 if door.along == "x" else 1
     centre, line = (door.x, door.y) if door.along == "x" else (door.y, door.x)
@@ -165,7 +165,7 @@ def _side(box: Box, axis: int) -> Rect:
 
 
 def _furniture_quads(plan: FloorPlan) -> list[Quad]:
-    """The faces of all pieces, less what leans on a wall, the floor or another piece."""
+    """Return the faces of all pieces, minus parts covered by walls, the floor or other pieces."""
     boxes = [_box(piece) for piece in plan.furniture]
     rooms: list[Box] = []
     for x0, y0, x1, y1 in map(_interior, plan.rooms):
@@ -175,8 +175,8 @@ def _furniture_quads(plan: FloorPlan) -> list[Quad]:
         for axis in range(3):
             for end in (0, 1):
                 offset, face = box[end][axis], _side(box, axis)
-                # Another piece hides the face where it begins in the plane in which this one
-                # ends; a room's own wall, where both end.
+                # Another piece covers the face if it begins in the plane in which this one
+                # ends; a wall of the room, if both end there.
                 covers = [_side(o, axis) for o in boxes if abs(o[1 - end][axis] - offset) < _SLIVER]
                 covers += [_side(r, axis) for r in rooms if abs(r[end][axis] - offset) < _SLIVER]
                 quads += [
@@ -188,7 +188,7 @@ def _furniture_quads(plan: FloorPlan) -> list[Quad]:
 
 def _pack(quads: list[Quad]) -> Surfaces:
     materials = tuple(sorted({quad[3] for quad in quads}))
-    # Rounded, so that edges that meet are the same number.
+    # Rounded, so that coordinates of edges that meet are equal.
     rects = np.array([quad[2] for quad in quads], dtype=np.float64).reshape(-1, 4).round(6)
     return Surfaces(
         axis=np.array([quad[0] for quad in quads], dtype=np.int8),
@@ -202,11 +202,11 @@ def _pack(quads: list[Quad]) -> Surfaces:
 
 
 def build_surfaces(plan: FloorPlan) -> Surfaces:
-    """All surfaces that can be met from inside an apartment.
+    """Build all surfaces that face the inside of an apartment.
 
-    Both faces of an inner wall carry the material of the room they face; doorways have jambs,
-    a lintel at 2.05 m and a threshold; windows are panes in the wall's inner face; furniture
-    is boxes. The outside of the building is left out.
+    Each face of an inner wall has the material of the room it faces; doorways have jambs, a
+    lintel at 2.05 m and a threshold; windows are panes in the wall's inner face; furniture is
+    boxes. The outside of the building is left out.
     """
     quads = [quad for room in plan.rooms for quad in _room_quads(room, plan)]
     quads += [quad for door in plan.doorways for quad in _doorway_quads(door, plan)]
@@ -214,7 +214,7 @@ def build_surfaces(plan: FloorPlan) -> Surfaces:
 
 
 def shoebox(size: tuple[float, float, float], material: str) -> Surfaces:
-    """The six inner faces of a box from the origin to `size` (x, y, z in metres)."""
+    """Build the six inner faces of a box from the origin to `size` (x, y, z in metres)."""
     box: Box = ((0.0, 0.0, 0.0), size)
     return _pack(
         [
@@ -257,18 +257,19 @@ def _clear(
 def line_of_sight(
     surfaces: Surfaces, origins: NDArray[np.float64], targets: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Whether the straight line between two points meets no surface.
+    """Test the straight lines between pairs of points for surfaces in between.
 
     Parameters
     ----------
     surfaces : Surfaces
+        Surfaces of the scene.
     origins, targets : (N, 3) float64
-        Points x, y, z in metres. A surface that touches the line at one of its two ends alone
-        does not count.
+        Points x, y, z in metres. A surface that touches an end of the line does not count.
 
     Returns
     -------
     (N,) bool
+        True where no surface crosses the line.
     """
     return np.asarray(
         _clear(

@@ -1,4 +1,4 @@
-"""Telling layouts apart, however they are turned, mirrored or shifted."""
+"""Comparison of layouts up to rotation, mirroring and translation."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Key = tuple[tuple[str, int, int, int, int], ...]
 
 
 def layout_key(plan: FloorPlan) -> Key:
-    """What is the same for two plans if and only if their rooms are copies or mirrors.
+    """Compute a key that is equal for two plans if and only if their layouts are congruent.
 
-    Rooms (kind and bounds, in centimetres) and doorways are brought into the smallest of
-    their eight turned and mirrored forms, with the south-west corner at the origin. Furniture
-    does not count: a home with the sofa moved is still a copy.
+    The key is the smallest of the eight rotated and mirrored forms of the rooms (kind and bounds,
+    in centimetres) and doorways, with the south-west corner at the origin. Furniture does not
+    count.
     """
     shapes = [(room.kind, room.x0, room.y0, room.x1, room.y1) for room in plan.rooms]
     shapes += [("doorway", door.x, door.y, door.x, door.y) for door in plan.doorways]
@@ -38,12 +38,12 @@ def _form(shapes: list[tuple[str, float, float, float, float]], turn: int) -> Ke
     return tuple(sorted((k, a - left, b - low, c - left, d - low) for k, a, b, c, d in forms))
 
 
-def likeness(a: FloorPlan, b: FloorPlan) -> float:
-    """How much two layouts look alike, from 0 to 1.
+def layout_similarity(a: FloorPlan, b: FloorPlan) -> float:
+    """Compute the similarity of two layouts, from 0 to 1.
 
-    The largest share of grid squares in rooms of the same kind, of all squares that either
-    plan takes, over the eight turned and mirrored forms of one laid upon the other, centre
-    upon centre and up to 1 m off; doorways count as a kind of their own. Copies and mirrors give 1.
+    The intersection over union of the grid squares, where squares match if their rooms are of
+    the same kind (doorways are a kind), maximised over the eight rotated and mirrored forms of one
+    layout and over shifts of up to 1 m from the centre. Congruent layouts give 1.
     """
     first = _raster(a)
     best = 0.0
@@ -67,7 +67,7 @@ def likeness(a: FloorPlan, b: FloorPlan) -> float:
 
 
 def _raster(plan: FloorPlan) -> NDArray[np.int8]:
-    """1 + the kind of room of every square, -1 in doorways, 0 where there is none."""
+    """Rasterise a plan: 1 + the kind of room of every square, -1 in doorways, 0 elsewhere."""
     lattice, rooms = squares_of(plan)
     corner = lattice.min(axis=0)
     lattice = lattice - corner

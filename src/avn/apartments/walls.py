@@ -1,4 +1,4 @@
-"""The solid parts of a plan seen from above: walls without their doorways."""
+"""Solid parts of a floor plan: walls without their doorways, and obstacles."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import DOOR_WIDTH, WALL_THICKNESS, Doorway, FloorPlan, Piece
 
 Interval = tuple[float, float]
-# Furniture whose underside hangs higher than this is walked under.
+# Furniture with its underside at or above this height is no obstacle; metres.
 HEADROOM = 1.7
 
 
@@ -31,16 +31,17 @@ def _cut(intervals: list[Interval], gap: Interval) -> list[Interval]:
 
 
 def walls(plan: FloorPlan) -> NDArray[np.float64]:
-    """The wall blocks of a plan, 0.1 m thick, with the doorways left out.
+    """Compute the wall blocks of a plan, 0.1 m thick, with the doorways left out.
 
     Parameters
     ----------
     plan : FloorPlan
+        The apartment.
 
     Returns
     -------
     (W, 4) float64
-        Rectangles x0, y0, x1, y1 in metres. They reach 0.05 m over the corners, so that walls
+        Rectangles x0, y0, x1, y1 in metres. They extend 0.05 m beyond the corners, so that walls
         that meet leave no gap; at a doorway they end at its jamb.
     """
     lines: dict[tuple[str, float], list[Interval]] = {}
@@ -68,12 +69,12 @@ def _gap(doorway: Doorway, along: str, line: float) -> Interval | None:
     return centre - DOOR_WIDTH / 2, centre + DOOR_WIDTH / 2
 
 
-def blocks_the_way(piece: Piece) -> bool:
-    """Whether a person would run into the piece: its underside is below 1.7 m."""
+def is_obstacle(piece: Piece) -> bool:
+    """Return True if a piece blocks an agent: its underside is below 1.7 m."""
     return piece.z < HEADROOM
 
 
 def obstacles(plan: FloorPlan) -> NDArray[np.float64]:
-    """Walls and furniture that a person would run into, (B, 4) x0, y0, x1, y1 in metres."""
-    boxes = [piece.bounds for piece in plan.furniture if blocks_the_way(piece)]
+    """Return walls and furniture that block an agent, (B, 4) x0, y0, x1, y1 in metres."""
+    boxes = [piece.bounds for piece in plan.furniture if is_obstacle(piece)]
     return np.concatenate([walls(plan), np.array(boxes, dtype=np.float64).reshape(-1, 4)])

@@ -1,0 +1,1 @@
+"""Basic types and tools that all packages use."""

@@ -1,4 +1,4 @@
-"""Actions, headings and states as numbers, and where each action leads."""
+"""Actions, headings and states as integers, and the transitions between states."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ HEADINGS = 4
 
 
 def transitions(neighbours: NDArray[np.int32]) -> NDArray[np.int64]:
-    """The state that each action leads to; a blocked move leads back to where it began.
+    """Compute the next state of each state and action; a blocked move keeps the state.
 
     Parameters
     ----------
     neighbours : (C, 4) int
-        The cell to the north, east, south and west, or -1.
+        Index of the cell to the north, east, south and west, or -1.
 
     Returns
     -------
@@ -25,17 +25,17 @@ def transitions(neighbours: NDArray[np.int32]) -> NDArray[np.int64]:
         By state (4 x cell + heading) and action. Backward keeps the heading.
     """
     cells = len(neighbours)
-    own = np.arange(cells)[:, None]
+    cell = np.arange(cells)[:, None]
     heading = np.arange(HEADINGS)[None, :]
-    reached = np.where(neighbours >= 0, neighbours, own).astype(np.int64)
+    reached = np.where(neighbours >= 0, neighbours, cell).astype(np.int64)
     behind = reached[:, (np.arange(HEADINGS) + 2) % HEADINGS]
     table = np.stack(
         (
             HEADINGS * reached + heading,
             HEADINGS * behind + heading,
-            HEADINGS * own + (heading - 1) % HEADINGS,
-            HEADINGS * own + (heading + 1) % HEADINGS,
-            HEADINGS * own + heading,
+            HEADINGS * cell + (heading - 1) % HEADINGS,
+            HEADINGS * cell + (heading + 1) % HEADINGS,
+            HEADINGS * cell + heading,
         ),
         axis=-1,
     )

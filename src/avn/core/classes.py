@@ -1,4 +1,4 @@
-"""Classes by the name that a config gives them, their parameters, and objects built of them."""
+"""Import of the classes that a config names, their parameters, and construction of objects."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from avn.core.errors import UserError
 
 
 def import_class(option: str, target: str) -> Any:
-    """The class that a config names.
+    """Import the class that a config names.
 
     Parameters
     ----------
     option : str
-        The key of the config, for the message.
+        Key of the config, for the message.
     target : str
         Module and class, such as `avn.views.raycast.Raycast`.
 
     Raises
     ------
     UserError
-        Where it cannot be imported.
+        If it cannot be imported.
     """
     module, _, name = target.rpartition(".")
     try:
@@ -40,30 +40,30 @@ def import_class(option: str, target: str) -> Any:
 
 
 def parameters(cls: type) -> dict[str, tuple[Any, Any]]:
-    """Type and default of each parameter of a class, by name.
+    """Return the type and default of each parameter of a class, by name.
 
-    Parameters that `**` hands on to a base class are among them; where both have one, the class
-    itself counts. `inspect.Parameter.empty` stands for no default.
+    Parameters that `**` passes on to a base class are among them; those of the class itself have
+    precedence. `inspect.Parameter.empty` stands for no default.
     """
-    found: dict[str, tuple[Any, Any]] = {}
+    described: dict[str, tuple[Any, Any]] = {}
     for owner in cls.__mro__:
         if "__init__" not in vars(owner) or owner is object:
             continue
         # names in a dataclass's annotations are of the modules of its bases
         data = dataclasses.is_dataclass(owner)
         hints = _hints(owner if data else owner.__init__)  # type: ignore[misc]
-        own = list(inspect.signature(owner.__init__).parameters.values())[1:]  # type: ignore[misc]
-        for each in own:
+        taken = list(inspect.signature(owner.__init__).parameters.values())[1:]  # type: ignore[misc]
+        for each in taken:
             if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY):
-                default = _made(owner, each.name) if data else each.default
-                found.setdefault(each.name, (hints.get(each.name), default))
-        if not any(each.kind is each.VAR_KEYWORD for each in own):
+                default = _field_default(owner, each.name) if data else each.default
+                described.setdefault(each.name, (hints.get(each.name), default))
+        if not any(each.kind is each.VAR_KEYWORD for each in taken):
             break
-    return found
+    return described
 
 
-def _made(cls: Any, name: str) -> Any:
-    """The default of a dataclass's field."""
+def _field_default(cls: Any, name: str) -> Any:
+    """Return the default of a dataclass's field."""
     field = cls.__dataclass_fields__[name]
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
@@ -78,24 +78,24 @@ def _hints(function: Any) -> dict[str, Any]:
 
 
 def build_object(option: str, node: DictConfig, **given: Any) -> Any:
-    """The object that a node of the config describes.
+    """Build the object that a node of the config describes.
 
     Keys that are no parameters of its class, such as the `name` of an option, are left out. Nodes
-    below it become objects of their own class, or plain dicts where the class builds them itself.
+    below it become objects of their own class, or plain dicts if the class takes dicts.
 
     Parameters
     ----------
     option : str
-        The key of the node, for messages.
+        Key of the node, for messages.
     node : DictConfig
-        With `_target_`.
+        Settings with `_target_`.
     **given
-        Arguments that are in no config; those that the class does not take are left out.
+        Arguments that are not in the config; those that the class does not take are left out.
 
     Raises
     ------
     UserError
-        Where there is no such class, or the class refuses a value.
+        If there is no such class, or the class rejects a value.
     """
     target = str(node["_target_"])
     cls = import_class(f"{option}._target_", target)
@@ -105,9 +105,9 @@ def build_object(option: str, node: DictConfig, **given: Any) -> Any:
 
 
 def _value(value: Any, hint: Any) -> Any:
-    """A setting as its class takes it: nodes are dataclasses, or plain dicts where it takes those.
+    """Convert a setting to the type of its parameter: nodes to dataclasses, or to plain dicts.
 
-    Networks take dicts, which a checkpoint can hold.
+    Networks take dicts, which can be stored in checkpoints.
     """
     if not isinstance(value, Container):
         return value
@@ -124,16 +124,16 @@ def build_part(config: Any, node: str = "", **given: Any) -> Any:
     Parameters
     ----------
     config : config or dict
-        With `_target_`.
+        Settings with `_target_`.
     node : str
-        Where in the config the part stands, such as `sound_model`, if it does not say so itself.
+        Node of the config that holds the part, such as `sound_model`, for messages.
     **given
         Further arguments.
 
     Raises
     ------
     UserError
-        The one that the part raised, with the node before it if given.
+        If the part raises it; the node is put before the message.
     """
     try:
         return instantiate(config, **given)

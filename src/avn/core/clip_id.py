@@ -1,4 +1,4 @@
-"""Which clip is heard: one tensor for each thing that tells it from others."""
+"""Identity of audio clips, as one tensor for each component."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from torch import Tensor
 
 
 class ClipId(NamedTuple):
-    """The clips of N agents or of N rows of a batch.
+    """Identity of the clips of N agents or of N rows of a batch.
 
     Attributes
     ----------
     source, state : (N,) int64 tensor
-        Where the sound comes from and where it is heard.
+        Index of the source and state of the receiver.
     sound : (N,) int64 tensor
-        Which recording, as an index.
+        Index of the recording.
     realisation : (N,) int64 tensor
-        Which draw of the recording's start and of the microphone's noise.
+        Index of the draw of the recording's start and of the microphone's noise.
     """
 
     source: Tensor

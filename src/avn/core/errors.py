@@ -1,8 +1,8 @@
-"""The one exception for mistakes that a user can make and mend."""
+"""Exception for mistakes of the user."""
 
 
 class UserError(Exception):
-    """A mistake of the user's: one line that names the option or file and says what to do.
+    """Mistake of the user: one line that names the option or file and says what to do.
 
-    The commands print it without a traceback and exit with code 2.
+    Commands print it without a traceback and exit with code 2.
     """

@@ -1,4 +1,4 @@
-"""Names, locks and atomic writes of what lies under `outputs`."""
+"""Names, locks and atomic writes of files under `outputs`."""
 
 from __future__ import annotations
 
@@ -17,12 +17,24 @@ _held: set[Path] = set()
 
 
 def stage_folder(outputs: str | Path, stage: str, what: str, made_from: str) -> Path:
-    """`outputs/<stage>/<what>-<hash8>`."""
+    """Return the folder `<outputs>/<stage>/<what>-<hash>` of a stage.
+
+    Parameters
+    ----------
+    outputs : str or Path
+        Folder of all outputs.
+    stage : str
+        Name of the stage.
+    what : str
+        Name of the product.
+    made_from : str
+        Fingerprint, of which the first 8 digits are in the name.
+    """
     return Path(outputs) / stage / f"{what}-{made_from[:8]}"
 
 
 def check_name(option: str, name: str) -> None:
-    """Refuse a name that would lead a folder astray; raises `UserError` with the option."""
+    """Raise `UserError` with the option for a name that is not valid as a folder's name."""
     if not name or name.startswith(".") or "/" in name or "\0" in name:
         raise UserError(f"{option}: '{name}' cannot name a folder; use letters, digits, - and _")
 
@@ -31,7 +43,14 @@ def check_name(option: str, name: str) -> None:
 def locked(folder: Path, what: str) -> Iterator[None]:
     """Hold the lock of a stage's folder; it is freed when the process ends, however it ends.
 
-    Who holds it already, since one stage of a folder needs another of the same folder, goes on.
+    The lock is reentrant, since one stage of a folder may need another of the same folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    what : str
+        Title of the stage, for the message while waiting.
     """
     if folder in _held:
         yield
@@ -56,7 +75,7 @@ def locked(folder: Path, what: str) -> Iterator[None]:
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside `path`, and rename it to `path` once the block has ended."""
+    """Yield a temporary path beside `path`, and rename it to `path` when the block has ended."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

@@ -14,14 +14,14 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 
 
 def digest(*parts: Any) -> str:
-    """SHA-256, in hex, of plain values, configs and dataclasses; order of keys is of no account."""
+    """Compute the SHA-256, in hex, of plain values, configs and dataclasses; keys are sorted."""
     return hashlib.sha256(canonical(parts).encode()).hexdigest()
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256, in hex, of a file's bytes."""
-    found = path.stat()
-    return _file_hash(path, found.st_mtime_ns, found.st_size)
+    """Compute the SHA-256, in hex, of a file's bytes, cached by time of change and size."""
+    status = path.stat()
+    return _file_hash(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(maxsize=64)
@@ -30,7 +30,7 @@ def _file_hash(path: Path, changed: int, size: int) -> str:
 
 
 def canonical(value: Any) -> str:
-    """The one JSON text of a value, on which `digest` is computed."""
+    """Return the canonical JSON text of a value, on which `digest` is computed."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain)
 
 

@@ -1,8 +1,8 @@
-"""Work that runs ahead: batches are made in threads while the network learns from earlier ones.
+"""Prefetching of batches in threads while the network is trained on earlier ones.
 
-One thread for an operation and several operations side by side: the operations on a batch of
-clips are too short to be divided among threads, which on a busy machine wait for one another
-ten times longer than they work.
+Each operation runs on one thread, and several batches are made in parallel: the operations on a
+batch of clips are too short to be divided among threads, whose synchronisation on a busy machine
+takes ten times as long as the work.
 """
 
 from __future__ import annotations
@@ -32,10 +32,19 @@ def threads_for_one_operation(count: int) -> Iterator[None]:
 
 
 def prefetch(make: Callable[[Part], Made], parts: Iterable[Part], threads: int) -> Iterator[Made]:
-    """Give `make(part)` for each part in order, made in `threads` threads.
+    """Yield `make(part)` for each part in order, computed in threads.
 
-    Not more than two results a thread wait in memory. What the parts are is asked for in the
+    At most two results for each thread are kept in memory. The iterable is advanced in the
     calling thread.
+
+    Parameters
+    ----------
+    make : callable
+        Function of a part; must be thread-safe.
+    parts : iterable
+        Its arguments.
+    threads : int
+        Number of threads.
     """
     with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
         waiting: deque[Future[Made]] = deque()
@@ -52,17 +61,18 @@ def prefetch(make: Callable[[Part], Made], parts: Iterable[Part], threads: int) 
 
 
 class PrefetchLoader(DataLoader[Any]):
-    """A data loader whose dataset makes whole batches, ahead, in threads of this process.
+    """Data loader that prefetches whole batches of a dataset in threads of this process.
 
-    Threads share the impulse responses that lie in memory; processes would each load them.
+    Threads share the impulse responses in memory; processes would each load them.
 
     Parameters
     ----------
     dataset : Dataset
-        Its `__getitems__` gives a batch, and may be called by several threads at once.
+        Its `__getitems__` returns a batch and must be thread-safe.
     threads : int
+        Number of threads.
     **options
-        Those of `torch.utils.data.DataLoader`.
+        Options of `torch.utils.data.DataLoader`.
     """
 
     def __init__(self, dataset: Any, threads: int, **options: Any) -> None:
@@ -70,4 +80,5 @@ class PrefetchLoader(DataLoader[Any]):
         self.threads = threads
 
     def __iter__(self) -> Iterator[Any]:  # type: ignore[override]
+        """Yield the batches of one epoch."""
         return prefetch(self.dataset.__getitems__, self.batch_sampler, self.threads)  # type: ignore

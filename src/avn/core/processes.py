@@ -1,4 +1,4 @@
-"""Work spread over processes, each job's result handed back as it is done."""
+"""Distribution of jobs over worker processes."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ Result = TypeVar("Result")
 def in_processes(
     work: Callable[[Job], Result], jobs: Sequence[Job], processes: int
 ) -> Iterator[Result]:
-    """Do all jobs, begun in their order, and give each result when it is there.
+    """Run all jobs, started in their order, and yield each result when it is done.
 
     Parameters
     ----------
     work : callable
-        A function of a module, so that other processes find it.
+        Function of a job, at the top level of a module, so that it can be pickled.
     jobs : sequence
+        Arguments of `work`.
     processes : int
-        With 1, or a single job, the work is done in this process.
+        Number of processes; with 1, or a single job, the work is done in this process.
     """
     if processes <= 1 or len(jobs) <= 1:
         yield from map(work, jobs)

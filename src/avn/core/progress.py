@@ -1,4 +1,4 @@
-"""What long work tells its user: lines, lengths of time, and bars with a rate and the time left."""
+"""Messages to the user during long work: lines, durations and progress bars."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-# Where bars are drawn while a dashboard stands on the screen.
+# Progress displays of open dashboards, the last of which takes new bars.
 _shared: list[Progress] = []
 
 
@@ -29,7 +29,7 @@ class _Rate(ProgressColumn):
 
 
 def progress_columns(console: Console) -> Progress:
-    """Bars with a rate and the time left, not yet shown."""
+    """Build a display of bars with a rate and the time left, not yet shown."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -42,7 +42,7 @@ def progress_columns(console: Console) -> Progress:
 
 @contextmanager
 def bars_in(progress: Progress) -> Iterator[None]:
-    """Draw the bars of the block among those of a dashboard, each as long as its work lasts."""
+    """Show the bars of the block in the display of a dashboard, each while its work lasts."""
     _shared.append(progress)
     try:
         yield
@@ -52,7 +52,22 @@ def bars_in(progress: Progress) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(what: str, total: int, unit: str) -> Iterator[Callable[[int], None]]:
-    """Show a bar on the error stream; the block calls what it gets with each count done."""
+    """Show a progress bar on the error stream, or in an open dashboard.
+
+    Parameters
+    ----------
+    what : str
+        Description of the work.
+    total : int
+        Number of units of work.
+    unit : str
+        Name of the units, in the plural.
+
+    Yields
+    ------
+    callable
+        Function that advances the bar by a number of units.
+    """
     if _shared:
         progress = _shared[-1]
         task = progress.add_task(what, total=total, unit=unit)
@@ -72,5 +87,5 @@ def log(line: str) -> None:
 
 
 def format_duration(seconds: float) -> str:
-    """A length of time in words, such as `40 s` or `2.5 min`."""
+    """Format a duration in seconds, such as `40 s` or `2.5 min`."""
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.1f} min"

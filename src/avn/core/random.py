@@ -1,9 +1,9 @@
-"""Random numbers that are a function of their names alone.
+"""Counter-based random numbers, a pure function of the names of a stream and an index.
 
-Starts, exploration walks and takes must stay the same for ever, whatever becomes of a library's
-generators, and the draw of one episode must not depend on who else is in the batch. So they come
-from a hash of what they are for: SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom
-number generators", OOPSLA 2014) over a key that SHA-256 makes of the names.
+Start states, exploration walks and realisations must not change with versions of a library, and
+the draws of one episode must not depend on the rest of the batch. So they are SplitMix64 (Steele,
+Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014) over a key that is a
+SHA-256 hash of the names.
 """
 
 from __future__ import annotations
@@ -19,23 +19,25 @@ _MIX_2 = np.uint64(0x94D049BB133111EB)
 
 
 def derive(*names: object) -> int:
-    """A 64-bit key from the names, the same on every machine."""
+    """Derive a 64-bit key from names, the same on every machine."""
     text = "\x1f".join(str(name) for name in names)
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
 
 
 def scramble(key: ArrayLike, index: ArrayLike) -> NDArray[np.uint64]:
-    """The `index`-th number of the stream of `key`; both broadcast against each other.
+    """Return the `index`-th number of the stream of `key`; both are broadcast.
 
     Parameters
     ----------
     key : array_like of uint64
+        Keys of `derive`.
     index : array_like of int
-        Not negative.
+        Indices, 0 or more.
 
     Returns
     -------
     ndarray of uint64
+        Uniform over all 64-bit integers.
     """
     start = np.atleast_1d(np.asarray(key, dtype=np.uint64))
     x = start + (np.atleast_1d(np.asarray(index)).astype(np.uint64) + np.uint64(1)) * _GAMMA
@@ -45,5 +47,5 @@ def scramble(key: ArrayLike, index: ArrayLike) -> NDArray[np.uint64]:
 
 
 def uniform(key: ArrayLike, index: ArrayLike) -> NDArray[np.float64]:
-    """Numbers in [0, 1) of the streams of `key`, with 53 random bits each."""
+    """Return numbers in [0, 1) of the streams of `key`, with 53 random bits each."""
     return (scramble(key, index) >> np.uint64(11)).astype(np.float64) * 2.0**-53

@@ -1,4 +1,4 @@
-"""Settings of a config by dotted key: their values, and which leaves a key stands for."""
+"""Settings of a config by dotted key: their values, and the leaves below a key."""
 
 from __future__ import annotations
 
@@ -12,56 +12,66 @@ _REFERENCE = re.compile(r"\$\{([\w.]+)\}")
 
 
 def typed(node: DictConfig) -> Any:
-    """The dataclass instance that a config node of a schema stands for."""
+    """Convert a config node of a schema to an instance of its dataclass."""
     return OmegaConf.to_object(node)
 
 
 def values(cfg: DictConfig, keys: Sequence[str], ignored: Sequence[str] = ()) -> list[Any]:
-    """Values of some keys, as plain Python; whole nodes lose what is ignored below them.
+    """Return the values of some keys as plain Python objects, without the ignored ones.
 
     Parameters
     ----------
     cfg : DictConfig
+        The config.
     keys : sequence of str
         Dotted keys of nodes or leaves.
     ignored : sequence of str
-        Dotted keys of leaves or nodes below them.
+        Dotted keys of leaves or nodes below them, to leave out.
 
     Returns
     -------
     list
-        Without the names of `keys`: the same values under two keys are the same.
+        Values in the order of `keys`, without their names.
     """
     return [_without(plain(cfg, key), key, ignored) for key in keys]
 
 
 def plain(cfg: DictConfig, key: str) -> Any:
-    """The value of a dotted key; a node becomes a dict or list, its references resolved."""
-    found = OmegaConf.select(cfg, key)
-    return OmegaConf.to_container(found, resolve=True) if isinstance(found, Container) else found
+    """Return the value of a dotted key; a node becomes a dict or list, its references resolved."""
+    value = OmegaConf.select(cfg, key)
+    return OmegaConf.to_container(value, resolve=True) if isinstance(value, Container) else value
 
 
 def _without(value: Any, key: str, ignored: Sequence[str]) -> Any:
     if not isinstance(value, dict):
         return value
     return {
-        name: _without(own, f"{key}.{name}", ignored)
-        for name, own in value.items()
+        name: _without(child, f"{key}.{name}", ignored)
+        for name, child in value.items()
         if f"{key}.{name}" not in ignored
     }
 
 
 def leaves(cfg: DictConfig, keys: Sequence[str], ignored: Sequence[str] = ()) -> set[str]:
-    """Dotted keys of all leaves at or below some keys, and of those that they refer to.
+    """Return the dotted keys of all leaves at or below some keys, and of those they refer to.
 
-    Where `mapper.localisation` is `${localisation}`, reading the one is reading the other.
+    If `mapper.localisation` is `${localisation}`, the leaves of both are returned.
+
+    Parameters
+    ----------
+    cfg : DictConfig
+        The config.
+    keys : sequence of str
+        Dotted keys of nodes or leaves.
+    ignored : sequence of str
+        Dotted keys of leaves or nodes to leave out, unless they are in `keys`.
     """
     hidden = set(ignored) - set(keys)
     return {leaf for key in keys for leaf in _leaves(cfg, key, hidden)}
 
 
 def _leaves(cfg: DictConfig, key: str, ignored: set[str], below: bool = False) -> Iterator[str]:
-    # `below`: the node that the key lies in has been looked at
+    # `below`: the parent node of the key has been visited
     if key in ignored:
         return
     for other, hidden in _referred(cfg, key, ignored, below):
@@ -77,7 +87,7 @@ def _leaves(cfg: DictConfig, key: str, ignored: set[str], below: bool = False) -
 def _referred(
     cfg: DictConfig, key: str, ignored: set[str], last: bool
 ) -> Iterator[tuple[str, set[str]]]:
-    """What a key refers to, itself or by a node that it lies in, and what is ignored there."""
+    """Yield the keys that a key or a node above it refers to, each with the keys ignored there."""
     parts = key.split(".")
     for count in range(len(parts) if last else 1, len(parts) + 1):
         node = ".".join(parts[:count])
@@ -87,7 +97,7 @@ def _referred(
         if OmegaConf.is_interpolation(holder, parts[count - 1]):
             raw: Any = OmegaConf.to_container(holder, resolve=False)
             for other in _REFERENCE.findall(str(raw[parts[count - 1]])):
-                moved = {other + own[len(node) :] for own in ignored if own.startswith(f"{node}.")}
+                moved = {other + k[len(node) :] for k in ignored if k.startswith(f"{node}.")}
                 yield other + key[len(node) :], moved
 
 

@@ -1,9 +1,8 @@
-"""Clips of the training and validation apartments, rendered batch by batch."""
+"""Audio clips of the training and validation apartments, as batches of spectrograms."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import lightning as L
@@ -11,142 +10,35 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
-from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra
+from avn.acoustics.clips import DrySounds
 from avn.acoustics.microphone import Microphone
 from avn.core.classes import build_part
-from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.prefetch import PrefetchLoader
-from avn.dataset.scene import AudibleScene, Brirs, Scene
-from avn.dataset.source_locations import where_sources_are
-from avn.modules.audio_network import ClipBatch, PictureBatch
+from avn.datamodules.clip_set import ClipSet
+from avn.dataset.scene import AudibleScene, Scene
+from avn.dataset.source_locations import locate_sources
+from avn.modules.audio_network import PictureBatch
 from avn.modules.spectrogram import Spectrogram
 
-# The clips on which networks in training are compared; the same for every `train_seed`.
+# Seed of the clips on which networks are validated; the same for every `train_seed`.
 VALIDATION_SEED = 0
 
 
-@dataclass
-class SceneClips:
-    """What is needed of one apartment to render clips and to judge what is heard.
-
-    Attributes
-    ----------
-    brirs : Brirs
-        Impulse responses.
-    locations : (K, S, 2) float32 tensor
-        Metres right and front.
-    in_sight : (K, S) bool tensor
-    """
-
-    brirs: Brirs
-    locations: Tensor
-    in_sight: Tensor
-
-    @classmethod
-    def of(cls, scene: AudibleScene) -> SceneClips:
-        """Of an apartment."""
-        return cls(scene.brirs, *where_sources_are(scene))
-
-
-class ClipSet(Dataset[ClipBatch]):
-    """The clips of some apartments, each a (take, apartment, source, state, sound).
-
-    An item is one number, `(take x pairs + pair) x sounds + sound`, so that takes never end. A
-    batch is rendered at once by `__getitems__`; a clip is a pure function of its item, of
-    `purpose` and of `seed`.
-
-    Parameters
-    ----------
-    scenes : sequence of AudibleScene
-    sounds : DrySounds
-    microphone : Microphone
-    purpose : {"train", "eval"}
-        Takes of the two purposes have nothing in common.
-    seed : int
-    targets : sequence of (K, S, ...) tensors, optional
-        What is to be heard in each apartment; the locations of the sources, if not given.
-    """
-
-    def __init__(
-        self,
-        scenes: Sequence[AudibleScene],
-        sounds: DrySounds,
-        microphone: Microphone,
-        purpose: str,
-        seed: int,
-        targets: Sequence[Tensor] | None = None,
-    ) -> None:
-        self.scenes = [SceneClips.of(scene) for scene in scenes]
-        self.sounds = sounds
-        self.renderer = ClipRenderer(sounds, microphone, seed, purpose)
-        shapes = [clips.in_sight.shape for clips in self.scenes]
-        grids = [torch.cartesian_prod(torch.arange(k), torch.arange(s)) for k, s in shapes]
-        self.source, self.state = torch.cat(grids).unbind(1)
-        sizes = torch.tensor([len(grid) for grid in grids])
-        self.apartment = torch.arange(len(grids)).repeat_interleave(sizes)
-        wanted = targets or [clips.locations for clips in self.scenes]
-        self.target = torch.cat([target.flatten(0, 1) for target in wanted])
-        self.in_sight = torch.cat([clips.in_sight.flatten() for clips in self.scenes])
-
-    @property
-    def pairs(self) -> int:
-        """How many pairs of source and state there are."""
-        return len(self.source)
-
-    def __len__(self) -> int:
-        return self.pairs * len(self.sounds.names)
-
-    def item(self, pair: Tensor, sound: Tensor, realisation: int) -> Tensor:
-        """The number of a clip."""
-        return (realisation * self.pairs + pair) * len(self.sounds.names) + sound
-
-    def __getitem__(self, item: int) -> ClipBatch:
-        return self.__getitems__([item])
-
-    def __getitems__(self, items: Sequence[int]) -> ClipBatch:
-        """Render a batch."""
-        number = torch.as_tensor(items, dtype=torch.int64)
-        sound = number % len(self.sounds.names)
-        pair = number // len(self.sounds.names)
-        realisation, pair = pair // self.pairs, pair % self.pairs
-        # A pair that is heard with several sounds is transformed once.
-        pair, index = pair.unique(return_inverse=True)
-        spectra = brir_spectra(self._brirs(pair), self.sounds.rate)
-        source, state = self.source[pair][index], self.state[pair][index]
-        return ClipBatch(
-            clips=self.renderer.render(spectra, ClipId(source, state, sound, realisation), index),
-            target=self.target[pair][index],
-            in_sight=self.in_sight[pair][index],
-            sound=sound,
-        )
-
-    def _brirs(self, pair: Tensor) -> Tensor:
-        """(N) pairs to (N, 2, T) impulse responses, each gathered from its apartment."""
-        apartment = self.apartment[pair]
-        longest = max(clips.brirs.samples for clips in self.scenes)
-        brirs = torch.zeros(len(pair), 2, longest)
-        for index, clips in enumerate(self.scenes):
-            rows = (apartment == index).nonzero()[:, 0]
-            if len(rows):
-                chosen = pair[rows]
-                gathered = clips.brirs.gather(self.source[chosen], self.state[chosen])
-                brirs[rows, :, : clips.brirs.samples] = gathered
-        return brirs
-
-
 class ClipSampler(Sampler[int]):
-    """The items of a training epoch in a random order: every pair, each time in another take.
+    """Sampler of a training epoch: every pair in a random order, in a new realisation.
 
-    The order is drawn from the seed and the epoch alone, so that a resumed training sees what
-    an uninterrupted one would have seen.
+    The order depends on the seed and the epoch alone, so that a resumed training gets the same
+    clips as an uninterrupted one.
 
     Parameters
     ----------
     clips : ClipSet
+        Training clips.
     seed : int
+        Seed of the order and of the sounds.
     sounds_per_pair : int
-        How many of the sounds a pair is heard with in one epoch.
+        Number of sounds of each pair in one epoch.
     """
 
     def __init__(self, clips: ClipSet, seed: int, sounds_per_pair: int) -> None:
@@ -154,42 +46,48 @@ class ClipSampler(Sampler[int]):
         self.epoch = 0
 
     def set_epoch(self, epoch: int) -> None:
-        """Called by the trainer before each epoch."""
+        """Set the epoch; the trainer calls this before each epoch."""
         self.epoch = epoch
 
     def __len__(self) -> int:
+        """Return the number of items of an epoch."""
         return self.clips.pairs * self.sounds_per_pair
 
     def __iter__(self) -> Iterator[int]:
+        """Yield the items of the epoch."""
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + self.epoch)
         sounds = len(self.clips.sounds.names)
         ranks = torch.rand(self.clips.pairs, sounds, generator=generator).argsort(1)
-        chosen = ranks[:, : self.sounds_per_pair].flatten()
-        pairs = torch.arange(self.clips.pairs).repeat_interleave(self.sounds_per_pair)
-        items = self.clips.item(pairs, chosen, self.epoch)
+        sound = ranks[:, : self.sounds_per_pair].flatten()
+        pair = torch.arange(self.clips.pairs).repeat_interleave(self.sounds_per_pair)
+        items = self.clips.item(pair, sound, self.epoch)
         yield from items[torch.randperm(len(items), generator=generator)].tolist()
 
 
 class PictureSet(Dataset[PictureBatch]):
-    """Clips as the pictures that the network sees, made where the clips are made.
+    """Data set of the spectrograms of clips.
 
     Parameters
     ----------
     clips : ClipSet
+        The clips.
     spectrogram : Spectrogram
+        Transform of clips to pictures.
     """
 
     def __init__(self, clips: ClipSet, spectrogram: Spectrogram) -> None:
         self.clips, self.spectrogram = clips, spectrogram
 
     def __len__(self) -> int:
+        """Return the number of clips of one realisation."""
         return len(self.clips)
 
     def __getitem__(self, item: int) -> PictureBatch:
+        """Make a batch of one item."""
         return self.__getitems__([item])
 
     def __getitems__(self, items: Sequence[int]) -> PictureBatch:
-        """Render a batch and take its spectrograms."""
+        """Render a batch of several items and compute its spectrograms."""
         batch = self.clips.__getitems__(items)
         return PictureBatch(
             pictures=self.spectrogram(batch["clips"]),
@@ -200,27 +98,29 @@ class PictureSet(Dataset[PictureBatch]):
 
 
 class SoundData(L.LightningDataModule):
-    """What a listening network is trained and validated on; test apartments never enter.
+    """Training and validation data of an audio network.
 
     Parameters
     ----------
     train, validation : sequence of AudibleScene
         Apartments of the two splits.
     sounds : DrySounds
-        Training hears all of them.
+        Bank of dry sounds, used for both.
     microphone : Microphone
+        Microphones at the ears.
     recipe : Any
-        Its `batch`, `train_seed`, `sounds_per_pair` and `validation_clips` are used.
+        Settings, of which `spectrogram`, `batch`, `train_seed`, `sounds_per_pair` and
+        `validation_clips` are used.
 
     Attributes
     ----------
     node, what : str
-        The node of the config that the recipe is, and what it trains, for messages.
+        Node of the settings in the config, and name of the network, for messages.
 
     Raises
     ------
     UserError
-        Where a split is empty or a number cannot work.
+        If a split is empty or a number is out of range.
     """
 
     node: ClassVar[str] = "sound_model"
@@ -248,7 +148,7 @@ class SoundData(L.LightningDataModule):
         self.scenes = {"validation": list(validation), "training": list(train)}
         self.sounds, self.recipe = sounds, recipe
         self.spectrogram: Spectrogram = build_part(recipe.spectrogram, self.node, rate=sounds.rate)
-        # Threads that render; the network learns in others.
+        # Number of threads that render, beside those of the network.
         self.threads = 1
         seed = recipe.train_seed
 
@@ -262,28 +162,28 @@ class SoundData(L.LightningDataModule):
         }
 
     def target_of(self, scene: Scene) -> Tensor:
-        """What is to be heard of each source in each state of an apartment, (K, S, ...)."""
-        return where_sources_are(scene)[0]
+        """Return the targets of all pairs of source and state of an apartment, (K, S, ...)."""
+        return locate_sources(scene)[0]
 
     def train_dataloader(self) -> PrefetchLoader:
-        """Every pair once an epoch (`sounds_per_pair` times), each time in a fresh take."""
+        """Build the loader of the training clips: `sounds_per_pair` for each pair and epoch."""
         return self.loader(self.train_clips, self.train_sampler())
 
     def train_sampler(self) -> Sampler[int]:
-        """The order of the training clips."""
+        """Build the sampler of the training clips."""
         return ClipSampler(self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair)
 
     def val_dataloader(self) -> list[PrefetchLoader]:
-        """Fixed clips of the validation and of the training apartments, in this order."""
+        """Build the loaders of fixed clips of validation and training apartments, in this order."""
         loaders = []
         for clips in self.measured_clips.values():
             generator = torch.Generator().manual_seed(VALIDATION_SEED)
             items = torch.randperm(len(clips), generator=generator)[: self.recipe.validation_clips]
-            # In order, so that the impulse responses are read from one end of the file on.
+            # Sorted, so that the impulse responses are read in the order of the file.
             loaders.append(self.loader(clips, items.sort().values.tolist()))
         return loaders
 
     def loader(self, clips: ClipSet, sampler: Sampler[int] | list[int]) -> PrefetchLoader:
-        """Batches of pictures of some clips, in an order."""
+        """Build a loader of spectrograms of some clips, in the order of a sampler."""
         pictures = PictureSet(clips, self.spectrogram)
         return PrefetchLoader(pictures, self.threads, batch_size=self.recipe.batch, sampler=sampler)

@@ -1,4 +1,4 @@
-"""Clips for the stop classifier: how many moves the goal is away, the goal itself shown often."""
+"""Audio clips for the stop classifier, with the distance to the goal as target."""
 
 from __future__ import annotations
 
@@ -14,26 +14,28 @@ from torch.utils.data import Sampler
 from avn.acoustics.clips import DrySounds
 from avn.acoustics.microphone import Microphone
 from avn.core.errors import UserError
-from avn.datamodules.sound import ClipSet, SoundData
+from avn.datamodules.clip_set import ClipSet
+from avn.datamodules.sound import SoundData
 from avn.dataset.scene import AudibleScene, Scene
 
-# Tells the cells of an apartment, (K, C) bool, at which each source counts as reached.
+# Function from a scene to the cells at which each source counts as reached, (K, C) bool.
 GoalCells = Callable[[Scene], NDArray[np.bool_]]
 
 
 def moves_to_goal(scene: Scene, goal: NDArray[np.bool_]) -> Tensor:
-    """Moves of the shortest walk to the goal, by source and state; 0 is at the goal.
+    """Compute the length of the shortest path to the goal in moves, by source and state.
 
     Parameters
     ----------
     scene : Scene
-        With K sources and C cells.
+        Apartment with K sources and C cells.
     goal : (K, C) bool
         Cells at which each source counts as reached.
 
     Returns
     -------
     (K, 4 C) float32 tensor
+        0 at the goal.
     """
     away = np.where(goal[:, None], scene.grid.distances[None], np.iinfo(np.int16).max)
     moves = torch.from_numpy(away.min(axis=2).astype(np.float32))
@@ -41,16 +43,21 @@ def moves_to_goal(scene: Scene, goal: NDArray[np.bool_]) -> Tensor:
 
 
 class StopData(SoundData):
-    """What the stop classifier is trained and validated on; the target is `moves_to_goal`.
+    """Training and validation data of the stop classifier; the target is `moves_to_goal`.
 
     Parameters
     ----------
     train, validation, sounds, microphone
-        As `SoundData` takes them.
+        As in `SoundData`.
     recipe : Any
-        Its `positives` is the share of training clips that are heard at the goal.
+        As in `SoundData`; `positives` is the share of training clips at the goal.
     goal : callable
-        Scene to (K, C) bool, the protocol's goal.
+        Function from a scene to its goal cells, (K, C) bool.
+
+    Raises
+    ------
+    UserError
+        As `SoundData`, or if all training pairs are at the goal, or none.
     """
 
     node = "stop_model"
@@ -76,32 +83,35 @@ class StopData(SoundData):
 
     @property
     def prior(self) -> float:
-        """Share of pairs of source and state in the training apartments that are at the goal."""
+        """Share of the training pairs of source and state that are at the goal."""
         return float(self.train_clips.target.eq(0).double().mean())
 
     def target_of(self, scene: Scene) -> Tensor:
-        """Moves to the goal of each source from each state, (K, S)."""
+        """Return the moves to the goal of each source from each state, (K, S)."""
         return moves_to_goal(scene, self.goal(scene))
 
     def train_sampler(self) -> Sampler[int]:
-        """An epoch in which the share `positives` is heard at the goal."""
+        """Build the sampler of epochs with the share `positives` of clips at the goal."""
         return GoalBalancedSampler(
             self.train_clips, self.recipe.train_seed, self.recipe.sounds_per_pair, self.positives
         )
 
 
 class GoalBalancedSampler(Sampler[int]):
-    """The items of a training epoch in a random order, many of them at the goal.
+    """Sampler of a training epoch with a given share of clips at the goal, in a random order.
 
-    An epoch has as many clips as there are pairs, times `sounds_per_pair`. Pairs at the goal come
-    several times, each time in another take and with a sound drawn anew; of the other pairs,
-    some are left out. All is drawn from the seed and the epoch alone.
+    An epoch has as many clips as there are pairs, times `sounds_per_pair`. Pairs at the goal are
+    repeated, each time with a new realisation and a random sound; some of the other pairs may be
+    left out. All draws depend on the seed and the epoch alone.
 
     Parameters
     ----------
     clips : ClipSet
-        Its target is 0 at the goal.
-    seed, sounds_per_pair : int
+        Training clips, with target 0 at the goal.
+    seed : int
+        Seed of the draws.
+    sounds_per_pair : int
+        Ratio of clips in an epoch to pairs.
     positives : float
         Share of clips at the goal.
     """
@@ -113,17 +123,19 @@ class GoalBalancedSampler(Sampler[int]):
         self.count = clips.pairs * sounds_per_pair
         self.positives = round(positives * self.count)
         groups = (self.positives, self.at_goal), (self.count - self.positives, self.elsewhere)
-        # So many takes of a pair there are at most in one epoch.
+        # Largest number of realisations of a pair in one epoch.
         self.realisations = max(-(-count // len(pairs)) for count, pairs in groups)
 
     def set_epoch(self, epoch: int) -> None:
-        """Called by the trainer before each epoch."""
+        """Set the epoch; the trainer calls this before each epoch."""
         self.epoch = epoch
 
     def __len__(self) -> int:
+        """Return the number of items of an epoch."""
         return self.count
 
     def __iter__(self) -> Iterator[int]:
+        """Yield the items of the epoch."""
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + self.epoch)
         items = torch.cat(
             [
@@ -134,7 +146,7 @@ class GoalBalancedSampler(Sampler[int]):
         yield from items[torch.randperm(len(items), generator=generator)].tolist()
 
     def _drawn(self, pairs: Tensor, count: int, generator: torch.Generator) -> Tensor:
-        """`count` items of some pairs: each pair once before any comes twice."""
+        """Draw `count` items of some pairs: each pair once before any is repeated."""
         rounds = torch.arange(count) // len(pairs)
         order = torch.randperm(len(pairs), generator=generator)
         pair = pairs[order[torch.arange(count) % len(pairs)]]

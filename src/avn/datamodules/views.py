@@ -1,4 +1,4 @@
-"""Views of the training and validation apartments with the windows that they show."""
+"""Views of the training and validation apartments, with the occupancy of their windows."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from avn.core.prefetch import PrefetchLoader
 from avn.modules.occupancy_cnn import ViewBatch
 from avn.modules.view_augment import AugmentConfig, augment
 
-# The views on which networks in training are compared; the same for every `train_seed`.
+# Seed of the views on which networks are validated; the same for every `train_seed`.
 VALIDATION_SEED = 0
-# Pixels of a view for one of the depth that is learned.
+# Stride of the learned depth, in pixels of the view.
 COARSE = 4
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What is needed of one apartment.
+class ApartmentViews:
+    """Views and windows of one apartment with S states.
 
     Attributes
     ----------
     rgb : sequence of (S, H, W, 3) uint8 arrays
-        Its views, one array for each look.
+        Views, one array for each appearance.
     depth : sequence of (S, H, W) float16 arrays
-        Metres along the camera's axis, 0 for nothing.
+        Depth along the camera's axis, metres; 0 for no surface.
     free, visible : (S, 5, 5) bool
-        The window of each state.
+        Free cells and visible cells of the window of each state.
     """
 
     rgb: Sequence[NDArray[np.uint8]]
@@ -45,26 +45,28 @@ class Seen:
 
 
 class ViewSet(Dataset[ViewBatch]):
-    """The views of some apartments.
+    """Data set of the views of some apartments.
 
-    An item is one number, `epoch x states + state`, where states count through the apartments. A
-    batch is made at once by `__getitems__`, and what is random in it comes of its items and the
+    An item is the integer `epoch x states + state`, where states are numbered through all
+    apartments. `__getitems__` makes a whole batch; its random draws depend on its items and the
     seed alone.
 
     Parameters
     ----------
-    apartments : sequence of Seen
+    apartments : sequence of ApartmentViews
+        Views and windows.
     seed : int
+        Seed of the augmentation.
     augmented : AugmentConfig, optional
-        How views are changed, in a look drawn for each. Without it they are as they are, in the
-        first look.
+        Augmentation of the views, each in an appearance that is drawn at random. None gives the
+        views of the first appearance without augmentation.
     mirror : bool
-        Whether half of them are mirrored.
+        True to mirror half of the views.
     """
 
     def __init__(
         self,
-        apartments: Sequence[Seen],
+        apartments: Sequence[ApartmentViews],
         seed: int = 0,
         augmented: AugmentConfig | None = None,
         mirror: bool = False,
@@ -78,20 +80,22 @@ class ViewSet(Dataset[ViewBatch]):
         self.visible = torch.from_numpy(np.concatenate([each.visible for each in apartments]))
 
     def __len__(self) -> int:
+        """Return the number of states of all apartments."""
         return len(self.free)
 
     def __getitem__(self, item: int) -> ViewBatch:
+        """Make a batch of one item."""
         return self.__getitems__([item])
 
     def __getitems__(self, items: Sequence[int]) -> ViewBatch:
-        """Make a batch."""
+        """Make a batch of several items."""
         number = torch.as_tensor(items, dtype=torch.int64)
         state = number % len(self)
         generator = torch.Generator().manual_seed(_mix(self.seed, items))
-        look = torch.rand(len(state), generator=generator) if self.augmented else None
-        rgb, depth = self._pictures(state, look)
+        appearance = torch.rand(len(state), generator=generator) if self.augmented else None
+        rgb, depth = self._pictures(state, appearance)
         pictures = rgb.permute(0, 3, 1, 2).float() / 255
-        # The nearest pixel: a mean over an edge is the depth of nothing.
+        # The nearest pixel: a mean over an edge is the depth of no surface.
         coarse = depth[:, None, COARSE // 2 :: COARSE, COARSE // 2 :: COARSE].float()
         inverse = torch.where(coarse > 0, 1 / coarse.clamp_min(0.05), 0.0)
         batch = ViewBatch(
@@ -106,77 +110,86 @@ class ViewSet(Dataset[ViewBatch]):
             batch["pictures"] = augment(batch["pictures"], self.augmented, generator)
         return batch
 
-    def _pictures(self, state: Tensor, look: Tensor | None) -> tuple[Tensor, Tensor]:
-        """Views (N, H, W, 3) and depth (N, H, W), each in a look drawn from 0..1."""
+    def _pictures(self, state: Tensor, appearance: Tensor | None) -> tuple[Tensor, Tensor]:
+        """Return views (N, H, W, 3) and depth (N, H, W); `appearance` (N,) is uniform in [0, 1)."""
         rgb, depth = [], []
-        for row, (index, own) in enumerate(zip(self.apartment[state], state, strict=True)):
-            seen = self.apartments[index]
-            which = int(look[row] * len(seen.rgb)) if look is not None else 0
-            rgb.append(seen.rgb[which][own - self.first[index]])
-            depth.append(seen.depth[which][own - self.first[index]])
+        for row, (index, each) in enumerate(zip(self.apartment[state], state, strict=True)):
+            views = self.apartments[index]
+            variant = int(appearance[row] * len(views.rgb)) if appearance is not None else 0
+            rgb.append(views.rgb[variant][each - self.first[index]])
+            depth.append(views.depth[variant][each - self.first[index]])
         return torch.from_numpy(np.stack(rgb)), torch.from_numpy(np.stack(depth))
 
 
 def _mix(seed: int, items: Sequence[int]) -> int:
-    """One number of a seed and a batch's items."""
+    """Combine a seed and a batch's items to one seed."""
     mixed = seed + 1
     for item in (len(items), items[0], items[-1]):
         mixed = (mixed * 6364136223846793005 + item + 1442695040888963407) % 2**63
     return mixed
 
 
-def _mirror_some(batch: ViewBatch, chosen: Tensor) -> None:
-    """Exchange left and right in the chosen rows (N,) of a batch."""
+def _mirror_some(batch: ViewBatch, rows: Tensor) -> None:
+    """Mirror the rows of a batch where `rows` (N,) is True."""
     for value in batch.values():
         assert isinstance(value, Tensor)
-        value[chosen] = value[chosen].flip(-1)
+        value[rows] = value[rows].flip(-1)
 
 
 class ViewSampler(Sampler[int]):
-    """The items of a training epoch: every view some times in a random order, each time anew.
+    """Sampler of a training epoch: every view `times` times in a random order.
 
-    The order is drawn from the seed and the epoch alone.
+    The order depends on the seed and the epoch alone. The items of each epoch, and so the
+    augmentations, are new.
 
     Parameters
     ----------
     count : int
-        How many views there are.
-    seed, times : int
+        Number of views.
+    seed : int
+        Seed of the order.
+    times : int
+        Number of repetitions of each view in one epoch.
     """
 
     def __init__(self, count: int, seed: int, times: int) -> None:
         self.count, self.seed, self.epoch = count * times, seed, 0
 
     def set_epoch(self, epoch: int) -> None:
-        """Called by the trainer before each epoch."""
+        """Set the epoch; the trainer calls this before each epoch."""
         self.epoch = epoch
 
     def __len__(self) -> int:
+        """Return the number of items of an epoch."""
         return self.count
 
     def __iter__(self) -> Iterator[int]:
+        """Yield the items of the epoch."""
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + self.epoch)
         order = torch.randperm(self.count, generator=generator)
         yield from (self.epoch * self.count + order).tolist()
 
 
 class ViewData(L.LightningDataModule):
-    """What the occupancy network is trained and validated on; test apartments never enter.
+    """Training and validation data of the occupancy network.
 
     Parameters
     ----------
-    train, validation : sequence of Seen
+    train, validation : sequence of ApartmentViews
         Apartments of the two splits.
     recipe : Any
-        Its `batch`, `train_seed`, `times`, `validation_views`, `augment` and `mirror` are used.
+        Settings, of which `batch`, `train_seed`, `times`, `validation_views`, `augment` and
+        `flip_augmentation` are used.
 
     Raises
     ------
     UserError
-        Where a split is empty.
+        If a split is empty.
     """
 
-    def __init__(self, train: Sequence[Seen], validation: Sequence[Seen], recipe: Any) -> None:
+    def __init__(
+        self, train: Sequence[ApartmentViews], validation: Sequence[ApartmentViews], recipe: Any
+    ) -> None:
         super().__init__()
         if not train or not validation:
             empty = "validation" if train else "train"
@@ -184,7 +197,7 @@ class ViewData(L.LightningDataModule):
                 f"split.{empty} has no apartment; the occupancy network needs at least one"
             )
         self.recipe = recipe
-        # Threads that make batches; the network learns in others.
+        # Number of threads that make batches, beside those of the network.
         self.threads = 1
         seed = recipe.train_seed
         self.train_views = ViewSet(train, seed, recipe.augment, recipe.flip_augmentation)
@@ -192,17 +205,17 @@ class ViewData(L.LightningDataModule):
 
     @property
     def prior(self) -> Tensor:
-        """How often each cell of the window is free in the training apartments, (5, 5)."""
+        """Frequency with which each cell of the window is free in training apartments, (5, 5)."""
         return self.train_views.free.mean(0)
 
     def train_dataloader(self) -> PrefetchLoader:
-        """Every view `times` times an epoch, changed anew each time."""
+        """Build the loader of the training views: each `times` times in an epoch, augmented."""
         recipe = self.recipe
         sampler = ViewSampler(len(self.train_views), recipe.train_seed, recipe.times)
         return self._loader(self.train_views, sampler)
 
     def val_dataloader(self) -> list[PrefetchLoader]:
-        """Some views of the validation and of the training apartments, as they are."""
+        """Build the loaders of fixed validation views and training views, not augmented."""
         loaders = []
         for views in self.measured_views.values():
             generator = torch.Generator().manual_seed(VALIDATION_SEED)

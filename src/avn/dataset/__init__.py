@@ -1,0 +1,1 @@
+"""Scene files: geometry, impulse responses and views of apartments, written and read."""

@@ -1,7 +1,7 @@
-"""Makes scene folders from floor plans: geometry at once, acoustics a source at a time.
+"""Writing of scene folders from floor plans: geometry and impulse responses.
 
-Each source's responses are kept in a file of their own until all of an apartment are there,
-so that a killed run goes on where it was.
+The responses of each source are kept in a temporary file until all sources of an apartment are
+done, so that an interrupted run can be resumed.
 """
 
 from __future__ import annotations
@@ -27,8 +27,13 @@ from avn.core.errors import UserError
 from avn.core.files import atomic_write
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
-from avn.dataset import scene, scene_file
-from avn.dataset.scene import Scene
+from avn.dataset import scene_file
+from avn.dataset.scene import (
+    DIRECT_PATH_VERSION,
+    GEOMETRY_VERSION,
+    REVERBERATION_VERSION,
+    Scene,
+)
 
 
 def build_geometry(
@@ -39,27 +44,28 @@ def build_geometry(
     Parameters
     ----------
     plan : FloorPlan
+        The apartment.
     acoustics : AcousticsConfig
-        Its heights of ears and sources are used.
+        Settings, of which the heights of receivers and sources are used.
     path : Path
         The file.
     fingerprint : str
-        What tells this file from those of other plans or settings; it is written into it.
+        Hash of all that the file depends on; it is stored in it.
 
     Raises
     ------
     UserError
-        For what `check_plan` refuses.
+        If `check_plan` rejects the plan.
     """
     grid, sources = check_plan(plan)
     surfaces = build_surfaces(plan)
-    ears = _points(grid.centres, acoustics.receiver_height)
-    places = _points(grid.centres[sources], acoustics.source_height)
+    receivers = _points(grid.centres, acoustics.receiver_height)
+    source_positions = _points(grid.centres[sources], acoustics.source_height)
     pairs = (len(sources), grid.cells, 3)
     in_sight = line_of_sight(
         surfaces,
-        np.broadcast_to(places[:, None], pairs).reshape(-1, 3),
-        np.broadcast_to(ears[None], pairs).reshape(-1, 3),
+        np.broadcast_to(source_positions[:, None], pairs).reshape(-1, 3),
+        np.broadcast_to(receivers[None], pairs).reshape(-1, 3),
     ).reshape(pairs[:2])
 
     def fill(file: h5py.File) -> None:
@@ -71,16 +77,16 @@ def build_geometry(
         file["in_sight"] = in_sight
         file["materials"] = np.array(surfaces.materials, dtype=h5py.string_dtype())
 
-    scene_file.write(path, "geometry", scene.GEOMETRY_VERSION, fingerprint, fill)
+    scene_file.write(path, "geometry", GEOMETRY_VERSION, fingerprint, fill)
 
 
 def check_plan(plan: FloorPlan) -> tuple[Grid, NDArray[np.int32]]:
-    """The grid of a plan and the cells of its sources.
+    """Check a plan, and return its grid and the cells of its sources.
 
     Raises
     ------
     UserError
-        Where its cells do not hang together, a source stands on none, or a material is unknown.
+        If the cells are not connected, a source is on no free cell, or a material is unknown.
     """
     grid = build_grid(plan)
     sources = source_cells(plan, grid)
@@ -100,7 +106,7 @@ def _check_materials(plan: FloorPlan) -> None:
 
 @dataclass(frozen=True)
 class _Job:
-    """What a worker needs to render one source of one apartment."""
+    """Job of a worker: one source of one apartment."""
 
     plan: FloorPlan
     acoustics: AcousticsConfig
@@ -113,60 +119,67 @@ def _points(centres: np.ndarray, height: float) -> np.ndarray:
     return np.column_stack([centres, np.full(len(centres), height)])
 
 
-def _render_tail(job: _Job) -> int:
+def _render_reverberation(job: _Job) -> int:
     surfaces = build_surfaces(job.plan)
     source = np.array([*job.source, job.acoustics.source_height])
-    ears = _points(job.cells, job.acoustics.receiver_height)
-    tail = brir.render_source(surfaces, source, ears, job.acoustics)
+    receivers = _points(job.cells, job.acoustics.receiver_height)
+    reverberation = brir.render_source(surfaces, source, receivers, job.acoustics)
     with atomic_write(job.part) as part, part.open("wb") as file:
-        np.savez(file, samples=tail.samples, scale=tail.scale, cut_db=tail.cut_db)
+        np.savez(
+            file,
+            samples=reverberation.samples,
+            scale=reverberation.scale,
+            cut_db=reverberation.cut_db,
+        )
     return len(job.cells)
 
 
 def _render_direct_paths(job: _Job) -> DirectPaths:
     source = np.array([*job.source, job.acoustics.source_height])
-    ears = _points(job.cells, job.acoustics.receiver_height)
-    return brir.render_direct_paths(walls(job.plan), source, ears, job.acoustics)
+    receivers = _points(job.cells, job.acoustics.receiver_height)
+    return brir.render_direct_paths(walls(job.plan), source, receivers, job.acoustics)
 
 
 def build_reverberation(
     files: Sequence[tuple[Scene, Path, str]], acoustics: AcousticsConfig, processes: int
 ) -> None:
-    """Trace the late reverberation of apartments, one source a job, in worker processes.
+    """Render the reverberation of apartments in worker processes, one job for each source.
 
     The results do not depend on the number of processes.
 
     Parameters
     ----------
     files : sequence of (Scene, Path, str)
-        Each apartment, its file, and the fingerprint of it.
+        Each apartment, its file, and the fingerprint of the file.
     acoustics : AcousticsConfig
+        Settings.
     processes : int
+        Number of worker processes.
     """
     jobs = [_jobs(scene, acoustics, path) for scene, path, _ in files]
-    todo = [job for own in jobs for job in own if not job.part.is_file()]
-    total = sum(len(job.cells) for own in jobs for job in own)
+    todo = [job for scene_jobs in jobs for job in scene_jobs if not job.part.is_file()]
+    total = sum(len(job.cells) for scene_jobs in jobs for job in scene_jobs)
     if total:
         with progress_bar("tracing sound", total, "pairs") as advance:
             advance(total - sum(len(job.cells) for job in todo))
-            for done in in_processes(_render_tail, todo, processes):
+            for done in in_processes(_render_reverberation, todo, processes):
                 advance(done)
-    for (own, path, fingerprint), parts in zip(files, jobs, strict=True):
-        _assemble(own, acoustics, parts, path, fingerprint)
+    for (scene, path, fingerprint), scene_jobs in zip(files, jobs, strict=True):
+        _assemble(scene, acoustics, scene_jobs, path, fingerprint)
 
 
-def _jobs(which: Scene, acoustics: AcousticsConfig, path: Path) -> list[_Job]:
-    parts, centres = path.parent / f".{path.stem}", which.grid.centres
+def _jobs(scene: Scene, acoustics: AcousticsConfig, path: Path) -> list[_Job]:
+    parts, centres = path.parent / f".{path.stem}", scene.grid.centres
     return [
-        _Job(which.plan, acoustics, tuple(centres[cell]), centres, parts / f"source-{k:03d}.npz")
-        for k, cell in enumerate(which.sources)
+        _Job(scene.plan, acoustics, tuple(centres[cell]), centres, parts / f"source-{k:03d}.npz")
+        for k, cell in enumerate(scene.sources)
     ]
 
 
 def _assemble(
-    which: Scene, acoustics: AcousticsConfig, jobs: list[_Job], path: Path, fingerprint: str
+    scene: Scene, acoustics: AcousticsConfig, jobs: list[_Job], path: Path, fingerprint: str
 ) -> None:
-    pairs = (len(jobs), which.grid.cells)
+    pairs = (len(jobs), scene.grid.cells)
 
     def fill(file: h5py.File) -> None:
         samples = round(acoustics.seconds * acoustics.rate)
@@ -179,29 +192,31 @@ def _assemble(
                 for name in ("samples", "scale", "cut_db"):
                     file[name][k] = part[name]
 
-    scene_file.write(path, "acoustics-tail", scene.TAIL_VERSION, fingerprint, fill)
+    scene_file.write(path, "acoustics-tail", REVERBERATION_VERSION, fingerprint, fill)
     shutil.rmtree(jobs[0].part.parent)
 
 
 def build_direct_sound(
-    which: Scene, acoustics: AcousticsConfig, path: Path, fingerprint: str
+    scene: Scene, acoustics: AcousticsConfig, path: Path, fingerprint: str
 ) -> None:
-    """Write the first arrivals of an apartment in the regime of `acoustics`.
+    """Write the direct paths of an apartment in the regime of `acoustics`.
 
     Parameters
     ----------
-    which : Scene
+    scene : Scene
+        The apartment.
     acoustics : AcousticsConfig
+        Settings.
     path : Path
         The file.
     fingerprint : str
-        What tells this file from others; it is written into it.
+        Hash of all that the file depends on; it is stored in it.
     """
-    arrivals = [_render_direct_paths(job) for job in _jobs(which, acoustics, path)]
+    paths = [_render_direct_paths(job) for job in _jobs(scene, acoustics, path)]
 
     def fill(file: h5py.File) -> None:
-        file["samples"] = np.stack([a.samples for a in arrivals])
-        file["scale"] = np.stack([a.scale for a in arrivals])
-        file["onset"] = np.stack([a.onset for a in arrivals])
+        file["samples"] = np.stack([p.samples for p in paths])
+        file["scale"] = np.stack([p.scale for p in paths])
+        file["onset"] = np.stack([p.onset for p in paths])
 
-    scene_file.write(path, "acoustics-first", scene.FIRST_ARRIVAL_VERSION, fingerprint, fill)
+    scene_file.write(path, "acoustics-first", DIRECT_PATH_VERSION, fingerprint, fill)

@@ -1,7 +1,7 @@
-"""Makes the views of apartments, in worker processes.
+"""Rendering of the views of apartments in worker processes.
 
-An apartment is lit once, then its views are rendered some at a time; light and views are kept
-in files of their own until all are there, so that a killed run goes on where it was.
+The lighting of an apartment is computed once, then its views are rendered in chunks. Both are kept
+in temporary files until all are done, so that an interrupted run can be resumed.
 """
 
 from __future__ import annotations
@@ -30,19 +30,20 @@ _CHUNK = 40
 
 @dataclass(frozen=True)
 class ViewsFile:
-    """The views of an apartment, to be made.
+    """Description of a file with the views of an apartment.
 
     Attributes
     ----------
     plan : FloorPlan
+        The apartment.
     part : {"train", "validation", "test"}
-        The pool of models, patterns and light.
+        Pool of models, patterns and light.
     look : int
-        Which draw from the pool.
+        Index of the draw from the pool.
     path : Path
         The file.
     fingerprint : str
-        What tells this file from others; it is written into it.
+        Hash of all that the file depends on; it is stored in it.
     """
 
     plan: FloorPlan
@@ -54,20 +55,20 @@ class ViewsFile:
 
 @dataclass(frozen=True)
 class _Lighting:
-    """What a worker needs to light an apartment."""
+    """Job of a worker: the lighting of an apartment."""
 
     views: ViewsFile
     cfg: RendererConfig
 
     @property
     def file(self) -> Path:
-        """Where the light is kept until all views are there."""
+        """Temporary file of the lighting."""
         return self.views.path.parent / f".{self.views.path.stem}" / "light.npz"
 
 
 @dataclass(frozen=True)
 class _Rendering:
-    """Views of the states from `first` up to `last`."""
+    """Job of a worker: the views of the states from `first` to `last`, the latter excluded."""
 
     lighting: _Lighting
     centres: NDArray[np.float64]
@@ -84,13 +85,16 @@ def build_views(files: Sequence[ViewsFile], cfg: RendererConfig, processes: int)
     Parameters
     ----------
     files : sequence of ViewsFile
+        Files to write.
     cfg : RendererConfig
+        Settings.
     processes : int
+        Number of worker processes.
 
     Raises
     ------
     UserError
-        Where the settings cannot work, or the renderer is not installed.
+        If a setting is out of range, or the renderer is not installed.
     """
     renderer_class(cfg).check(cfg)
     lightings = [_Lighting(own, cfg) for own in files]
@@ -140,7 +144,7 @@ def _light(job: _Lighting) -> int:
     return 1
 
 
-# The renderer of the apartment that this process is at, kept from one chunk to the next.
+# Renderer of this process's current apartment, kept from one chunk to the next.
 _OPENED: dict[Path, Renderer] = {}
 
 

@@ -1,4 +1,4 @@
-"""Embeddings of an apartment's views, in a file."""
+"""Files of the features (embeddings) of an apartment's views."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ VERSION = 1
 
 
 def write_features(path: Path, features: NDArray[np.float32], fingerprint: str) -> None:
-    """Store the features of an apartment's views.
+    """Write the features of an apartment's views.
 
     Parameters
     ----------
     path : Path
+        The file.
     features : (S, D) float32
-        Of the S states, 4 x cell + heading; each of length 1.
+        Unit vectors, one for each state 4 x cell + heading.
     fingerprint : str
-        What tells them from others, the views included.
+        Hash of all that the features depend on, the views included.
     """
 
     def fill(file: h5py.File) -> None:
@@ -34,28 +35,30 @@ def write_features(path: Path, features: NDArray[np.float32], fingerprint: str) 
 
 
 def read_features(path: Path, states: int, fingerprint: str | None = None) -> NDArray[np.float32]:
-    """The features of an apartment's views.
+    """Read the features of an apartment's views.
 
     Parameters
     ----------
     path : Path
+        The file.
     states : int
-        How many there must be.
+        Expected number of states S.
     fingerprint : str, optional
-        The one that the file must carry.
+        Expected fingerprint; None accepts any.
 
     Returns
     -------
     (S, D) float32
+        Unit vectors, one for each state.
 
     Raises
     ------
     UserError
-        Where the file is missing, damaged, of another making or another shape.
+        If the file is missing or damaged, or its fingerprint or shape is another.
     """
     with scene_file.open_checked(path, KIND, VERSION, fingerprint) as file:
         ndim = file["features"].ndim if "features" in file else 0
         width = file["features"].shape[-1] if ndim == 2 else 0
         scene_file.check_shapes(file, path, {"features": (states, width)})
-        found: NDArray[np.float32] = file["features"][()]
-    return found
+        features: NDArray[np.float32] = file["features"][()]
+    return features

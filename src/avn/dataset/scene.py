@@ -1,4 +1,4 @@
-"""Scenes: the geometry of an apartment and its impulse responses, read back from files."""
+"""Scenes: the geometry of an apartment and its impulse responses, read from files."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from avn.dataset import scene_file
 
 # Raised when the layout of a file changes.
 GEOMETRY_VERSION = 1
-TAIL_VERSION = 1
-FIRST_ARRIVAL_VERSION = 1
+REVERBERATION_VERSION = 1
+DIRECT_PATH_VERSION = 1
 
 
 class Brirs:
@@ -27,38 +27,44 @@ class Brirs:
 
     Parameters
     ----------
-    tail, first : (Path, str)
-        The files of the late reverberation and of the direct sound, and their fingerprints.
+    reverberation, direct_path : (Path, str)
+        The files of the reverberation and of the direct paths, and their expected fingerprints.
     sources, cells : int
-        How many there must be.
+        Expected numbers of sources and of cells.
 
     Attributes
     ----------
     samples : int
-        Length T of a response, at 16 kHz.
+        Length T of a response, in samples.
+    cut_db : (K, C) float32
+        Energy of the reverberation after T samples, in dB of all of it.
 
     Raises
     ------
     UserError
-        Where a file is missing, damaged or of another making.
+        If a file is missing or damaged, or its fingerprint or shape is another.
     """
 
     def __init__(
-        self, tail: tuple[Path, str], first: tuple[Path, str], sources: int, cells: int
+        self,
+        reverberation: tuple[Path, str],
+        direct_path: tuple[Path, str],
+        sources: int,
+        cells: int,
     ) -> None:
         pairs = (sources, cells)
-        self._tail, self._tail_scale, marks = _read(
-            tail, "acoustics-tail", TAIL_VERSION, pairs, memory_map=True
+        self._reverberation, self._reverberation_scale, marks = _read(
+            reverberation, "acoustics-tail", REVERBERATION_VERSION, pairs, memory_map=True
         )
-        self._first, self._first_scale, first_marks = _read(
-            first, "acoustics-first", FIRST_ARRIVAL_VERSION, pairs, memory_map=False
+        self._direct_path, self._direct_path_scale, direct_path_marks = _read(
+            direct_path, "acoustics-first", DIRECT_PATH_VERSION, pairs, memory_map=False
         )
-        self._onset = torch.from_numpy(first_marks["onset"].astype(np.int64))
-        self.samples = int(self._tail.shape[-1])
+        self._onset = torch.from_numpy(direct_path_marks["onset"].astype(np.int64))
+        self.samples = int(self._reverberation.shape[-1])
         self.cut_db: NDArray[np.float32] = marks["cut_db"]
 
     def gather(self, source: torch.Tensor, state: torch.Tensor) -> torch.Tensor:
-        """Impulse responses of N pairs.
+        """Gather the impulse responses of N pairs of source and state.
 
         Parameters
         ----------
@@ -70,14 +76,16 @@ class Brirs:
         Returns
         -------
         (N, 2, T) float32
-            Left and right ear; the time of flight is in them.
+            Left and right ear; with the time of flight.
         """
         cell, heading = state // 4, state % 4
         index = (source.numpy(), cell.numpy(), heading.numpy())
-        scale = torch.from_numpy(self._tail_scale[index[:2]])
-        brirs = torch.from_numpy(self._tail[index].astype(np.float32)).mul_(scale[:, None, None])
-        taps = torch.from_numpy(self._first[index].astype(np.float32))
-        taps *= torch.from_numpy(self._first_scale[index[:2]])[:, None, None]
+        scale = torch.from_numpy(self._reverberation_scale[index[:2]])
+        brirs = torch.from_numpy(self._reverberation[index].astype(np.float32)).mul_(
+            scale[:, None, None]
+        )
+        taps = torch.from_numpy(self._direct_path[index].astype(np.float32))
+        taps *= torch.from_numpy(self._direct_path_scale[index[:2]])[:, None, None]
         at = self._onset[source, cell][:, None] + torch.arange(taps.shape[-1])
         keep = at < self.samples
         at = at.clamp(max=self.samples - 1)[:, None].expand_as(taps)
@@ -95,7 +103,7 @@ def _read(
         scale = file["scale"][()]
         dataset = file["samples"]
         if memory_map:
-            # contiguous on purpose: the system reads the pages that are asked for, no more
+            # contiguous, so that only the pages that are used are read
             offset, shape = dataset.id.get_offset(), dataset.shape
             return np.memmap(path, np.int16, "r", offset, shape), scale, marks
         return dataset[()], scale, marks
@@ -108,13 +116,13 @@ class Scene:
     Attributes
     ----------
     folder : Path
-        The scene folder, which also holds its sound and its views.
+        The scene folder, which also holds impulse responses and views.
     plan, grid : FloorPlan, Grid
-        What is built, and its C cells.
+        The floor plan, and its C cells.
     sources : (K,) int32
         Cells of the sources.
     in_sight : (K, C) bool
-        Whether the straight line from the source to the ears meets no surface.
+        True where no surface crosses the straight line from the source to the receiver.
     """
 
     folder: Path
@@ -129,7 +137,7 @@ class Scene:
         return self.plan.name
 
     def with_brirs(self, brirs: Brirs) -> AudibleScene:
-        """The same apartment with its impulse responses."""
+        """Return the same apartment with its impulse responses."""
         return AudibleScene(**vars(self), brirs=brirs)
 
 
@@ -141,19 +149,19 @@ class AudibleScene(Scene):
 
 
 def load_scene(path: Path, fingerprint: str | None = None) -> Scene:
-    """Open an apartment.
+    """Read the geometry of an apartment.
 
     Parameters
     ----------
     path : Path
-        Its `geometry-*.h5`.
+        The file `geometry-*.h5`.
     fingerprint : str, optional
-        The one that the file must carry.
+        Expected fingerprint; None accepts any.
 
     Raises
     ------
     UserError
-        Where the file is missing, damaged or of another making.
+        If the file is missing or damaged, or its fingerprint is another.
     """
     with scene_file.open_checked(path, "geometry", GEOMETRY_VERSION, fingerprint) as file:
         data = {name: file[name][()] for name in file}

@@ -1,8 +1,7 @@
-"""The container of the scene files: HDF5 behind a header that tells whether it is whole.
+"""Container of the scene files: HDF5 with a header for integrity checks.
 
-The first 512 bytes (HDF5 calls them the user block) hold the length and the CRC-32 of all that
-follows, so that a file cut short or with a changed byte is told from a good one; any HDF5 tool
-reads the rest.
+The first 512 bytes (the user block of HDF5) hold the length and the CRC-32 of all that follows, so
+that truncated and corrupted files are detected; any HDF5 tool reads the rest.
 """
 
 from __future__ import annotations
@@ -33,13 +32,15 @@ def write(
     Parameters
     ----------
     path : Path
-        Where the file shall lie.
-    kind, version : str, int
-        What it holds, and the version of that format.
+        The file.
+    kind : str
+        Kind of the content, such as `geometry`.
+    version : int
+        Version of the format of that kind.
     made_from : str
-        Hash of everything its content depends on.
+        Fingerprint: hash of all that the content depends on.
     fill : callable
-        Writes the datasets into the open file.
+        Function that writes the datasets into the open file.
     """
     with atomic_write(path) as part:
         with h5py.File(part, "w", userblock_size=_BLOCK, libver="v110") as file:
@@ -54,17 +55,24 @@ def write(
 
 
 def open_checked(path: Path, kind: str, version: int, made_from: str | None = None) -> h5py.File:
-    """Open a scene file for reading, once it has shown to be whole and of the right making.
+    """Check a scene file and open it for reading.
 
     Parameters
     ----------
+    path : Path
+        The file.
+    kind : str
+        Expected kind of the content.
+    version : int
+        Expected version of the format.
     made_from : str, optional
-        The hash that it must carry; None takes any.
+        Expected fingerprint; None accepts any.
 
     Raises
     ------
     UserError
-        Where it is missing, cut short, changed, of another kind, version or making.
+        If the file is missing, truncated or corrupted, or its kind, version or fingerprint is
+        another.
     """
     if not path.is_file():
         raise UserError(f"{path}: no such scene file; run `python -m avn.generate` to make it")
@@ -72,18 +80,28 @@ def open_checked(path: Path, kind: str, version: int, made_from: str | None = No
         with ExitStack() as opened:
             file = opened.enter_context(h5py.File(path, "r"))
             _check(dict(file.attrs), path, kind, version, made_from)
-            opened.pop_all()  # it is whole: the caller closes it
+            opened.pop_all()  # the checks passed: the caller closes the file
             return file
-    except (OSError, KeyError, RuntimeError, ValueError) as error:  # what h5py makes of damage
+    except (OSError, KeyError, RuntimeError, ValueError) as error:  # h5py's errors for damage
         raise UserError(f"{path}: {_damage(path) or 'not an HDF5 file'}; {_MEND}") from error
 
 
 def check_shapes(file: h5py.File, path: Path, shapes: dict[str, tuple[int, ...]]) -> None:
-    """Raise `UserError` where a dataset is missing or has another shape than it must."""
+    """Raise `UserError` if a dataset is missing or has another shape than expected.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The open file.
+    path : Path
+        Its path, for messages.
+    shapes : dict
+        Name of each dataset to its expected shape.
+    """
     for name, shape in shapes.items():
         if name not in file or file[name].shape != shape:
-            found = file[name].shape if name in file else "missing"
-            raise UserError(f"{path}: '{name}' is {found}, not {shape}; make the scene again")
+            actual = file[name].shape if name in file else "missing"
+            raise UserError(f"{path}: '{name}' is {actual}, not {shape}; make the scene again")
 
 
 def _check(

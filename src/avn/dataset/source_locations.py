@@ -1,4 +1,4 @@
-"""Where the sources of an apartment lie for an agent in each of its states."""
+"""Locations of an apartment's sources relative to an agent in each state."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from avn.dataset.scene import Scene
 
 
 def relative_locations(lattice: Tensor, sources: Tensor) -> Tensor:
-    """Where each source lies for each state.
+    """Compute the location of each source relative to each state.
 
     Parameters
     ----------
     lattice : (C, 2) integer tensor
-        Cells, in steps of the grid to the east and to the north.
+        Lattice indices of the cells, to the east and to the north.
     sources : (K,) integer tensor
         Cells of the sources.
 
@@ -30,8 +30,8 @@ def relative_locations(lattice: Tensor, sources: Tensor) -> Tensor:
     return torch.stack((right, front), -1).flatten(1, 2)
 
 
-def where_sources_are(scene: Scene) -> tuple[Tensor, Tensor]:
-    """Relative locations (K, S, 2), and whether each source is in sight (K, S), of an apartment."""
+def locate_sources(scene: Scene) -> tuple[Tensor, Tensor]:
+    """Return the relative locations of sources (K, S, 2) in metres and their visibility (K, S)."""
     lattice = torch.from_numpy(scene.grid.lattice.astype("int64"))
     sources = torch.from_numpy(scene.sources.astype("int64"))
     in_sight = torch.from_numpy(scene.in_sight).repeat_interleave(4, dim=1)

@@ -1,4 +1,4 @@
-"""The views of an apartment, read back from their file."""
+"""Views of an apartment, read from their file."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class Views:
-    """The views of an apartment's S states, 4 x cell + heading.
+    """Views of an apartment's S states, 4 x cell + heading.
 
     Attributes
     ----------
     rgb : (S, H, W, 3) uint8
-        sRGB, row 0 at the top; mapped from the file, read when it is asked for.
+        sRGB, row 0 at the top; memory-mapped from the file.
     depth : (S, H, W) float16
-        Metres along the camera's axis to what the middle of the pixel shows; 0 for nothing.
+        Depth along the camera's axis at the middle of the pixel, metres; 0 for no surface.
     """
 
     rgb: NDArray[np.uint8]
@@ -38,16 +38,16 @@ def read_views(path: Path, states: int, fingerprint: str | None = None) -> Views
     Parameters
     ----------
     path : Path
-        Its `views-*.h5`.
+        The file `views-*.h5`.
     states : int
-        How many there must be.
+        Expected number of states.
     fingerprint : str, optional
-        The one that the file must carry.
+        Expected fingerprint; None accepts any.
 
     Raises
     ------
     UserError
-        Where the file is missing, damaged or of another making.
+        If the file is missing or damaged, or its fingerprint or shape is another.
     """
     with scene_file.open_checked(path, KIND, VERSION, fingerprint) as file:
         size = file["rgb"].shape[1] if "rgb" in file and file["rgb"].ndim == 4 else 0

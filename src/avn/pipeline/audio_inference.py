@@ -22,7 +22,7 @@ from avn.core.errors import UserError
 from avn.core.prefetch import prefetch, threads_for_one_operation
 from avn.core.progress import progress_bar
 from avn.dataset.scene import AudibleScene, Scene
-from avn.dataset.source_locations import where_sources_are
+from avn.dataset.source_locations import locate_sources
 from avn.modules.audio_network import AudioNetwork
 from avn.modules.sound_metrics import location_errors
 from avn.pipeline.apartments import Apartments
@@ -237,7 +237,7 @@ def sound_errors(scene: Scene, heard: Tensor, sounds: Sequence[str]) -> pd.DataF
         room, sound, sight, clips, error_m and bearing_deg (medians), front_back (share of clips
         whose bearing is off by more than 90 degrees).
     """
-    locations, visible = where_sources_are(scene)
+    locations, visible = locate_sources(scene)
     metres, degrees = location_errors(heard, locations[:, :, None, None])
     in_sight = visible[:, :, None, None].expand_as(metres)
     sight_masks = {"in_sight": in_sight, "out_of_sight": ~in_sight, "all": in_sight | True}

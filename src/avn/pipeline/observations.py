@@ -13,7 +13,7 @@ from torch import Tensor
 from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.dataset.scene import Scene
-from avn.dataset.source_locations import where_sources_are
+from avn.dataset.source_locations import locate_sources
 from avn.navigation.observations import SceneObservations
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_features import AudioEmbeddings
@@ -72,7 +72,7 @@ class Observation:
 def _true_estimates(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
     sounds = len(sound_files(apartments.cfg, apartments.world))
     return [
-        where_sources_are(scene)[0][:, :, None, None].expand(-1, -1, sounds, -1, -1)
+        locate_sources(scene)[0][:, :, None, None].expand(-1, -1, sounds, -1, -1)
         for scene in scenes
     ]
 

@@ -20,7 +20,7 @@ from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.progress import progress_bar
 from avn.core.settings import plain, typed
-from avn.datamodules.views import Seen, ViewData
+from avn.datamodules.views import ApartmentViews, ViewData
 from avn.dataset.scene import Scene
 from avn.dataset.views import Views
 from avn.modules.occupancy_cnn import OccupancyCnn
@@ -125,9 +125,11 @@ class OccupancyNetwork(Fitted):
         return torch.tensor(self.metrics()["prior"])
 
 
-def _seen(plan: FloorPlan, camera: CameraConfig, views: Sequence[Views]) -> Seen:
+def _seen(plan: FloorPlan, camera: CameraConfig, views: Sequence[Views]) -> ApartmentViews:
     free, visible = true_windows(plan, camera)
-    return Seen([v.rgb for v in views], [v.depth for v in views], free.numpy(), visible.numpy())
+    return ApartmentViews(
+        [v.rgb for v in views], [v.depth for v in views], free.numpy(), visible.numpy()
+    )
 
 
 def true_windows(plan: FloorPlan, camera: CameraConfig) -> tuple[Tensor, Tensor]:
