@@ -24,7 +24,7 @@ from avn.apartments.grid import build_grid
 from avn.apartments.splits import SplitConfig, load_split
 from avn.views.cycles import Cycles, CyclesConfig
 from avn.views.raycast import Raycast, RaycastConfig
-from avn.views.scenery import scenery
+from avn.views.scene_mesh import scene_mesh
 
 
 def timed(make, *arguments):
@@ -65,7 +65,7 @@ def run_pybullet(plan, centres, headings):
     import pybullet
 
     client = pybullet.connect(pybullet.DIRECT)
-    vertices = scenery(plan, "train").mesh.vertices.reshape(-1, 3)
+    vertices = scene_mesh(plan, "train").mesh.vertices.reshape(-1, 3)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "apartment.obj"
         with path.open("w") as file:

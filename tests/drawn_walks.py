@@ -42,10 +42,10 @@ def flat() -> DrawnPlace:
     return draw("flat", FLAT)
 
 
-def simulator(place: DrawnPlace, heard: Tensor | None = None) -> Simulator:
+def simulator(place: DrawnPlace, source_estimates: Tensor | None = None) -> Simulator:
     """Six episodes in which the agent sees true windows.
 
-    It hears the very place of the source, unless `heard` says otherwise.
+    It hears the very place of the source, unless `source_estimates` says otherwise.
     """
     lattice = torch.from_numpy(place.grid.lattice).long()
     sources = torch.from_numpy(np.asarray(place.sources)).long()
@@ -54,7 +54,9 @@ def simulator(place: DrawnPlace, heard: Tensor | None = None) -> Simulator:
         "local_patch": torch.from_numpy(window_cells(place.grid) >= 0).float(),
         "visual_embedding": torch.eye(4 * place.grid.cells),  # every state looks like itself alone
     }
-    observed = SceneObservations({"source_estimate": where if heard is None else heard}, visual)
+    observed = SceneObservations(
+        {"source_estimate": where if source_estimates is None else source_estimates}, visual
+    )
     return Simulator(place, frozen_episodes(place, ["ring"], VAR, 0), VAR, observed)
 
 
@@ -66,7 +68,7 @@ def ours(explores: bool = False, localisation: str = "retrieval+odometry") -> Pl
 def walked(agent: Agent, rows: Sequence[int] = tuple(range(6))) -> list[Trace]:
     """Traces of an agent's episodes in the flat."""
     world = simulator(flat())
-    recorder = Recorder({"flat": rows}, TAKES, thoughts=True)
+    recorder = Recorder({"flat": rows}, TAKES, beliefs=True)
     walk(agent, world, recorder)
     found = records(world, Labels("ours", "resonance")).to_dict("records")
     return [recorder.trace("flat", row, found[row]) for row in rows]

@@ -119,7 +119,7 @@ class StripesConfig(RendererConfig):
 class Stripes(Renderer):
     """Pictures of stripes, as bright as the heading."""
 
-    def __init__(self, cfg: StripesConfig, plan, part, look=0, prepared=None):
+    def __init__(self, cfg: StripesConfig, plan, part, appearance_seed=0, prepared=None):
         self.cfg = cfg
 
     def prepare(self):

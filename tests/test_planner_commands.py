@@ -56,7 +56,7 @@ def test_it_explores_and_finds_itself(command, outputs, localisation, exploratio
     assert len(records(out)) == 2 * 4
     places = pd.read_csv(Path(out[-1]) / "localisation.csv").groupby("cells")["error_m"].mean()
     assert places["walked"] < places["other"]
-    assert any("where views are recognised" in line for line in out)
+    assert any("localisation by memory retrieval" in line for line in out)
 
 
 def test_what_its_networks_tell_it_is_judged_beside_its_records(command, outputs):
@@ -68,7 +68,7 @@ def test_what_its_networks_tell_it_is_judged_beside_its_records(command, outputs
     heard = pd.read_csv(Path(out[-1]) / "source_estimates.csv")
     assert set(heard["acoustics"]) == {"resonance"}
     assert not (Path(out[-1]) / "localisation.csv").exists()
-    assert any("which cells look free" in line for line in out)
+    assert any("local patches: prediction of free cells" in line for line in out)
 
 
 def test_the_truth_in_place_of_a_part_makes_a_bound_of_it(command, outputs):

@@ -71,7 +71,7 @@ def test_figures_are_those_of_the_run_with_intervals_and_the_papers(
     table = pd.read_csv(run / "results.csv").query("sound == 'alarm' and scene == 'room_1'")
     row = (100 * table[["sr", "spl", "sr_low", "sr_high"]]).iloc[0]
     with opened(browser, page) as shown:
-        cell = shown.locator("td.cell[data-run='2'][data-sound=alarm][data-room=room_1]")
+        cell = shown.locator("td.cell[data-run='2'][data-sound=alarm][data-scene=room_1]")
         assert cell.locator("b").inner_text() == f"{row['sr']:.1f} / {row['spl']:.1f}"
         assert f"{row['sr_low']:.0f}–{row['sr_high']:.0f}" in cell.inner_text()
         assert "paper 9.0 / 8.2" in cell.inner_text()
@@ -80,7 +80,7 @@ def test_figures_are_those_of_the_run_with_intervals_and_the_papers(
 def test_a_cell_opens_its_episodes_and_an_episode_plays(browser, page, command, outputs):
     episodes = pd.read_csv(made(command, outputs, "ours_noexp") / "episodes.csv")
     with opened(browser, page) as shown:
-        shown.locator("td.cell[data-run='0'][data-sound=clock][data-room=room_1]").click()
+        shown.locator("td.cell[data-run='0'][data-sound=clock][data-scene=room_1]").click()
         rows = shown.locator("#episode-list tbody tr")
         assert rows.count() == len(episodes.query("sound == 'clock'"))
         shown.locator("#episode-list tr.open").first.click()
@@ -111,7 +111,7 @@ def test_a_cell_opens_its_episodes_and_an_episode_plays(browser, page, command, 
 
 def test_the_same_episode_of_other_runs_stands_beside(browser, page):
     with opened(browser, page) as shown:
-        shown.locator("td.cell[data-run='0'][data-sound=alarm][data-room=room_1]").click()
+        shown.locator("td.cell[data-run='0'][data-sound=alarm][data-scene=room_1]").click()
         shown.locator("#episode-list tr.open").first.click()
         titles = set()
         assert shown.locator("#twins button").count() == len(AGENTS)
@@ -159,7 +159,13 @@ def test_what_comes_from_names_is_shown_and_never_run(browser, tmp_path):
     pixel = page_media.view_url(np.zeros((4, 4, 3), dtype=np.uint8))
     plan = {"image": pixel, "left": 0.0, "top": 4.0, "width": 4.0, "height": 4.0}
     episode = {"title": evil, "outcome": evil, "goal": [1, 1], "path": [[1, 1, 0], [1, 2, 0]]}
-    episode |= {"action": [0], "collided": [0, 0], "heard": None, "belief": None, "memory": None}
+    episode |= {
+        "action": [0],
+        "collided": [0, 0],
+        "source_estimates": None,
+        "belief": None,
+        "memory": None,
+    }
     episode |= {"sound": page_media.sound_url(np.zeros((32000, 2), dtype=np.float32), 16000)}
     episode |= {"run": 0, "plan": 0, "views": [0, 0], "twins": [0]}
     html = render(evil, [run], [plan], [pixel], [episode])
@@ -214,7 +220,7 @@ def test_runs_of_several_seeds_stand_together_too(browser, command, outputs, cap
             *("greedy, seeds 0, 1", "greedy, seed=0", "greedy, seed=1"),
             *("random_walk, seeds 0, 1", "random_walk, seed=0", "random_walk, seed=1"),
         }
-        cell = shown.locator("td.cell[data-run='0'][data-sound=all][data-room=average]")
+        cell = shown.locator("td.cell[data-run='0'][data-sound=all][data-scene=average]")
         assert cell.locator("b").inner_text().startswith(f"{100 * episodes['success'].mean():.1f}")
         assert "over seeds" in cell.inner_text()
         cell.click()
@@ -232,7 +238,7 @@ def test_the_ways_of_all_episodes_on_request(browser, command, outputs, capfd, t
     assert report.main([str(folder), *options]) == 0
     episodes = pd.read_csv(folder / "episodes.csv")
     with opened(browser, path) as shown:
-        shown.locator("td.cell[data-sound=all][data-room=average]").click()
+        shown.locator("td.cell[data-sound=all][data-scene=average]").click()
         rows = shown.locator("#episode-list tr.open")
         assert rows.count() == len(episodes)
         rows.first.click()

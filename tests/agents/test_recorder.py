@@ -24,9 +24,11 @@ def test_a_trace_is_the_walk_that_the_records_tell_of() -> None:
         assert trace.collided.sum() == record["collisions"]
         assert trace.goal.tolist() == trace.place.grid.centres[record["source_cell"]].tolist()
         # Its ears are perfect here.
-        assert trace.heard is not None
-        np.testing.assert_allclose(trace.heard, np.tile(trace.goal, (len(state), 1)), atol=1e-5)
-        assert trace.thoughts is None
+        assert trace.source_estimates is not None
+        np.testing.assert_allclose(
+            trace.source_estimates, np.tile(trace.goal, (len(state), 1)), atol=1e-5
+        )
+        assert trace.beliefs is None
         assert trace.walk is None
 
 
@@ -44,13 +46,13 @@ def test_the_takes_are_those_that_the_simulator_lets_hear() -> None:
             told.append(observation["source_estimate"][:, 0])
             return super().act(observation)
 
-    recorder = Recorder({"flat": [1, 4]}, TAKES, thoughts=False)
+    recorder = Recorder({"flat": [1, 4]}, TAKES, beliefs=False)
     walk(Ears(), world, recorder)
     for row in (1, 4):
         trace = recorder.trace("flat", row, {})
-        heard = [int(step[row]) for step in told[: len(trace.action)]]
-        assert trace.realisation[:-1].tolist() == heard
-        assert len(set(heard)) > 1
+        takes = [int(step[row]) for step in told[: len(trace.action)]]
+        assert trace.realisation[:-1].tolist() == takes
+        assert len(set(takes)) > 1
 
 
 @pytest.mark.parametrize(
@@ -62,36 +64,36 @@ def test_beliefs_lie_where_the_apartment_lies(explores: bool, localisation: str)
     traces = walked(agent)
     assert len({trace.state[0] % 4 for trace in traces}) > 1  # from starts that look elsewhere
     for trace in traces:
-        thoughts = trace.thoughts
-        assert thoughts is not None
-        assert thoughts.free is not None
-        squares = trace.place.grid.lattice - thoughts.low
-        free = np.zeros(thoughts.free.shape[1:], dtype=bool)
+        beliefs = trace.beliefs
+        assert beliefs is not None
+        assert beliefs.free is not None
+        squares = trace.place.grid.lattice - beliefs.low
+        free = np.zeros(beliefs.free.shape[1:], dtype=bool)
         free[squares[:, 1], squares[:, 0]] = True
-        for step, belief in enumerate(thoughts.free):
-            x, y = trace.place.grid.lattice[trace.state[step] // 4] - thoughts.low
+        for step, belief in enumerate(beliefs.free):
+            x, y = trace.place.grid.lattice[trace.state[step] // 4] - beliefs.low
             if localisation != "retrieval":
                 assert belief[y, x] == 255
             if not explores:  # what it saw is true
                 assert free[belief > 200].all()
                 assert not free[belief < 50].any()
         if localisation != "retrieval":
-            np.testing.assert_allclose(thoughts.pose[:, :2], trace.path[:-1])
-            assert (thoughts.pose[:, 2] == trace.state[:-1] % 4).all()
+            np.testing.assert_allclose(beliefs.pose[:, :2], trace.path[:-1])
+            assert (beliefs.pose[:, 2] == trace.state[:-1] % 4).all()
 
 
 def test_the_memory_returns_the_very_place_where_it_was_before() -> None:
     seen = 0
     for trace in walked(ours(explores=True)):
-        thoughts = trace.thoughts
+        beliefs = trace.beliefs
         assert trace.walk is not None
-        assert thoughts is not None
-        assert thoughts.similarity is not None
-        assert thoughts.retrieved is not None
+        assert beliefs is not None
+        assert beliefs.similarity is not None
+        assert beliefs.retrieved is not None
         for step in np.flatnonzero(np.isin(trace.state[:-1], trace.walk)):
-            assert thoughts.similarity[step, 0] == 1
-            assert thoughts.retrieved[step, 0, :2].tolist() == trace.path[step].tolist()
-            assert thoughts.retrieved[step, 0, 2] == trace.state[step] % 4
+            assert beliefs.similarity[step, 0] == 1
+            assert beliefs.retrieved[step, 0, :2].tolist() == trace.path[step].tolist()
+            assert beliefs.retrieved[step, 0, 2] == trace.state[step] % 4
             seen += 1
     assert seen
 
@@ -99,7 +101,7 @@ def test_the_memory_returns_the_very_place_where_it_was_before() -> None:
 def test_who_looks_on_changes_nothing_and_may_leave_early() -> None:
     watched, alone = simulator(flat()), simulator(flat())
     walk(ours(), alone)
-    recorder = Recorder({"flat": [0, 1]}, TAKES, thoughts=True)
+    recorder = Recorder({"flat": [0, 1]}, TAKES, beliefs=True)
     calls = 0
 
     def watch(*step: object) -> bool:
@@ -112,7 +114,7 @@ def test_who_looks_on_changes_nothing_and_may_leave_early() -> None:
     assert (watched.actions[:2] == alone.actions[:2]).all()
     assert calls <= int(alone.actions.max()) + 1
     other = simulator(flat())
-    walk(ours(), other, Recorder({"elsewhere": [0]}, TAKES, thoughts=True))
+    walk(ours(), other, Recorder({"elsewhere": [0]}, TAKES, beliefs=True))
     assert not other.actions.any()
 
 
@@ -124,6 +126,6 @@ def test_a_mapper_without_pictures_of_its_beliefs_is_left_out() -> None:
     agent = ours(explores=True)
     agent.mapper = Blind(41)
     trace = walked(agent, [2])[0]
-    assert trace.thoughts is not None
-    assert trace.thoughts.free is None
-    assert trace.thoughts.retrieved is not None
+    assert trace.beliefs is not None
+    assert trace.beliefs.free is None
+    assert trace.beliefs.retrieved is not None

@@ -43,18 +43,18 @@ def test_mirrored_views_have_mirrored_windows() -> None:
     assert 8 < turned < 32
 
 
-def test_training_shows_all_looks_and_measuring_the_first() -> None:
-    apartment = synthetic_views(20, 0, looks=3)
+def test_training_shows_all_appearances_and_measuring_the_first() -> None:
+    apartment = synthetic_views(20, 0, appearances=3)
     views = ViewSet([apartment], augmented=SAME)
     seen = set()
     for realisation in range(5):
         batch = views.__getitems__([20 * realisation + state for state in range(20)])
         for state, picture in enumerate((batch["pictures"] * 255).round().byte()):
             matches = [
-                look
-                for look in range(3)
+                appearance
+                for appearance in range(3)
                 if torch.equal(
-                    picture.permute(1, 2, 0), torch.from_numpy(apartment.rgb[look][state])
+                    picture.permute(1, 2, 0), torch.from_numpy(apartment.rgb[appearance][state])
                 )
             ]
             seen |= set(matches)

@@ -24,10 +24,10 @@ def plan():
     return generate(3, "flat", sources=3, size="small")
 
 
-def build_views(plan, folder, part="train", cfg=CFG, processes=1, look=0):
+def build_views(plan, folder, part="train", cfg=CFG, processes=1, appearance_seed=0):
     """Make the views of an apartment in a folder; gives their file."""
-    path = folder / f"views-{part}-{look}.h5"
-    build([ViewsFile(plan, part, look, path, "a fingerprint")], cfg, processes)
+    path = folder / f"views-{part}-{appearance_seed}.h5"
+    build([ViewsFile(plan, part, appearance_seed, path, "a fingerprint")], cfg, processes)
     return path
 
 
@@ -76,8 +76,8 @@ def test_a_killed_run_goes_on_where_it_was(plan, made, states, tmp_path, monkeyp
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_another_look_is_another_apartment_to_the_eye(plan, made, states, tmp_path):
-    other = read_views(build_views(plan, tmp_path, look=2), states)
+def test_another_appearance_seed_gives_other_views(plan, made, states, tmp_path):
+    other = read_views(build_views(plan, tmp_path, appearance_seed=2), states)
     assert np.abs(other.rgb.astype(int) - read_views(made, states).rgb).mean() > 5
 
 

@@ -16,7 +16,7 @@ from avn.datamodules.views import ViewData
 from avn.modules.occupancy_cnn import OccupancyCnn
 from avn.modules.training import BEST, LAST, fit, load_weights
 from avn.modules.view_augment import AugmentConfig
-from avn.reporting.window_figures import WindowFigures
+from avn.reporting.local_patch_figures import LocalPatchFigures
 
 
 def recipe(**changes: Any) -> DictConfig:
@@ -32,7 +32,9 @@ def recipe(**changes: Any) -> DictConfig:
 
 def build(**changes: Any) -> tuple[ViewData, OccupancyCnn]:
     config = recipe(**changes)
-    data = ViewData([synthetic_views(120, 0, looks=2)], [synthetic_views(60, 1)], typed(config))
+    data = ViewData(
+        [synthetic_views(120, 0, appearances=2)], [synthetic_views(60, 1)], typed(config)
+    )
     return data, build_object("occupancy_model", config)
 
 
@@ -40,7 +42,7 @@ def build(**changes: Any) -> tuple[ViewData, OccupancyCnn]:
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, OccupancyCnn, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("run")
     data, model = build()
-    return folder, model, fit(data, model, folder, [WindowFigures()])
+    return folder, model, fit(data, model, folder, [LocalPatchFigures()])
 
 
 def test_what_is_painted_where_a_cell_is_is_learned(

@@ -183,7 +183,7 @@ def test_equal_worlds_share_their_sound_and_other_parts_share_no_views():
     test, training = Apartments(cfg, "validation"), Apartments(cfg, "validation", TRAINING)
     assert DirectSound(cfg, test).paths == DirectSound(cfg, training).paths
     assert RenderedViews(cfg, test).paths == RenderedViews(cfg, training).paths
-    assert RenderedViews(cfg, test).paths != RenderedViews(cfg, test, look=1).paths
+    assert RenderedViews(cfg, test).paths != RenderedViews(cfg, test, appearance_seed=1).paths
 
 
 @pytest.mark.parametrize(

@@ -50,8 +50,10 @@ def test_a_run_is_walked_again_from_its_own_config(command, outputs, agent):
         assert trace.state[-1] // 4 == row["end_cell"]
         assert len(trace.action) == row["actions"]
     # what an actor-critic agent hears is a feature, no place, and its map is its own affair
-    assert (traces[0].heard is None) == (agent not in ("greedy", "ours_noexp", "ours_exp"))
-    assert (traces[0].thoughts is None) == (not agent.startswith("ours"))
+    assert (traces[0].source_estimates is None) == (
+        agent not in ("greedy", "ours_noexp", "ours_exp")
+    )
+    assert (traces[0].beliefs is None) == (not agent.startswith("ours"))
     assert (traces[0].walk is None) == (agent not in ("ours_exp", "a3c_va_m_mapper"))
 
 
@@ -71,13 +73,13 @@ def test_the_clips_of_a_trace_are_those_that_the_network_heard(command, outputs)
     perceived = Perceived(run)
     for trace in replay.traces(run, [1, len(run.episodes) - 2]):
         with torch.inference_mode():
-            heard = model.eval()(perceived.clips(trace))
+            source_estimates = model.eval()(perceived.clips(trace))
         heading, here = trace.state % 4, trace.path
-        right, front = heard.double().unbind(1)
+        right, front = source_estimates.double().unbind(1)
         east = torch.stack((right, front, -right, -front))[heading, torch.arange(len(here))]
         north = torch.stack((front, -right, -front, right))[heading, torch.arange(len(here))]
         found = here + torch.stack((east, north), dim=1).numpy()
-        assert abs(found - trace.heard).max() < 1e-3
+        assert abs(found - trace.source_estimates).max() < 1e-3
 
 
 def test_records_of_another_making_are_refused(command, outputs):

@@ -56,7 +56,7 @@ def test_each_stage_is_named_once_and_before_what_needs_it(plan, tmp_path):
         "visual embeddings of the test apartments of 'mini' (efficientnet_lite0)",
         "agent 'a3c_va' (resonance, var, train_seed 0)",
         "run of 'a3c_va' (seed 0, train_seed 0)",
-        "views of the train apartments of 'mini' (raycast, look 1)",
+        "views of the train apartments of 'mini' (raycast, appearance 1)",
         "occupancy network 'small' (raycast, train_seed 0)",
         "agent 'a3c_va_m_mapper' (resonance, var, train_seed 0)",
         "run of 'ours_noexp' (seed 1, train_seed 0)",
@@ -94,7 +94,7 @@ def test_what_a_present_stage_was_made_of_is_not_asked_for(plan):
     metrics.parent.mkdir(parents=True)
     metrics.touch()
     left = names(plan("ours_noexp"))
-    assert not [name for name in left if "look 1" in name or "views of the train" in name]
+    assert not [name for name in left if "appearance 1" in name or "views of the train" in name]
 
 
 def test_one_row_twice_and_one_network_for_two_train_seeds_walk_once(plan):

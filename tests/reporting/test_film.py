@@ -32,8 +32,8 @@ def played(path: Path) -> np.ndarray:
 
 
 def film(path: Path, trace: Trace) -> Path:
-    heard = clips(trace)
-    write_film(path, trace, "ours", views(trace), heard, soundtrack(heard))
+    heard_clips = clips(trace)
+    write_film(path, trace, "ours", views(trace), heard_clips, soundtrack(heard_clips))
     return path
 
 
@@ -58,22 +58,22 @@ def test_a_film_has_a_second_for_each_step_and_two_ears(tmp_path: Path) -> None:
 
 def test_an_agent_without_ears_or_map_is_filmed_too(tmp_path: Path) -> None:
     trace = min(walked(RandomWalk()), key=lambda own: len(own.action))
-    deaf = type(trace)(**{**vars(trace), "heard": None})
+    deaf = type(trace)(**{**vars(trace), "source_estimates": None})
     pictures = shown(film(tmp_path / "own.mp4", deaf))
     assert len(pictures) == FPS * len(trace.state)
 
 
 def test_the_seconds_of_a_soundtrack_meet_without_a_click() -> None:
     trace = walked(ours(), [0])[0]
-    heard = clips(trace)[:4]
-    heard[1:] *= -0.5
-    track = soundtrack(heard)
+    heard_clips = clips(trace)[:4]
+    heard_clips[1:] *= -0.5
+    track = soundtrack(heard_clips)
     assert track.shape == (4 * 16000, 2)
     assert np.abs(track).max() == pytest.approx(0.9)
-    hard = heard.permute(0, 2, 1).reshape(-1, 2).numpy()
+    hard = heard_clips.permute(0, 2, 1).reshape(-1, 2).numpy()
     factor = 0.9 / np.abs(hard).max()
     steps = np.abs(np.diff(track, axis=0)).max()
-    assert steps <= factor * np.abs(np.diff(heard.numpy(), axis=-1)).max() + 0.02
+    assert steps <= factor * np.abs(np.diff(heard_clips.numpy(), axis=-1)).max() + 0.02
 
 
 def test_a_film_that_cannot_be_written_is_one_line(tmp_path: Path, monkeypatch) -> None:

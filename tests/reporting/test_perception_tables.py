@@ -2,7 +2,11 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from avn.reporting.perception_tables import heard_table, places_table, windows_table
+from avn.reporting.perception_tables import (
+    local_patches_table,
+    localisation_table,
+    source_estimates_table,
+)
 
 
 def lines(table) -> list[str]:
@@ -14,14 +18,14 @@ def lines(table) -> list[str]:
 
 def test_what_is_heard_is_the_mean_of_the_rooms():
     row = {"sound": "alarm", "sight": "in_sight", "bearing_deg": 10.0, "front_back": 0.25}
-    heard = pd.DataFrame([{**row, "error_m": 1.0}, {**row, "error_m": 2.0}])
-    assert lines(heard_table(heard))[-1] == "alarm, in sight 1.50 10 25 %"
+    source_estimates = pd.DataFrame([{**row, "error_m": 1.0}, {**row, "error_m": 2.0}])
+    assert lines(source_estimates_table(source_estimates))[-1] == "alarm, in sight 1.50 10 25 %"
 
 
 def test_windows_are_those_of_all_rooms():
     row = {"by": "network", "cells": "visible", "ece": 0.0131, "loss": 0.3, "accuracy": 0.9}
     seen = pd.DataFrame([{**row, "scene": "a", "auc": 0.5}, {**row, "scene": "all", "auc": 0.9512}])
-    found = lines(windows_table(seen))
+    found = lines(local_patches_table(seen))
     assert found[-1] == "network, visible cells 0.951 90.0 % 0.013"
     assert len(found) == 3  # title, head, one row
 
@@ -30,4 +34,4 @@ def test_windows_are_those_of_all_rooms():
 def test_places_are_the_mean_of_the_rooms_that_have_any(second, shown):
     row = {"cells": "walked", "views": 4, "error_mean_m": 2.0, "heading": 0.5}
     places = pd.DataFrame([{**row, "error_m": 1.0}, {**row, "error_m": second}])
-    assert lines(places_table(places))[-1] == f"walked cells {shown} 2.00 50 %"
+    assert lines(localisation_table(places))[-1] == f"walked cells {shown} 2.00 50 %"

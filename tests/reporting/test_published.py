@@ -71,7 +71,7 @@ def test_a_cell_has_its_interval_its_spread_and_the_papers_own(table):
     shown = console.file.getvalue().splitlines()
     first = next(n for n, line in enumerate(shown) if line.startswith("  ring"))
     assert "acoustics=resonance" in " ".join(shown[:3])
-    assert shown[first - 1].strip() == "greedy (a bound)"
+    assert shown[first - 1].strip() == "greedy (upper bound)"
     names = ("ring", "95 %", "± over seeds", "Gan et al. 2020")
     for name, own, line in zip(names, lines, shown[first:], strict=False):
         assert line.strip().startswith(name)

@@ -120,14 +120,14 @@ def test_across_seeds_gives_mean_and_spread() -> None:
 def test_compare_pairs_the_episodes() -> None:
     one, other = episodes(), episodes("oracle")
     shuffled = other.sample(frac=1.0, random_state=0)
-    table = compare(one, shuffled).set_index("figure")
+    table = compare(one, shuffled).set_index("metric")
     rooms = (one["dtg"] - other["dtg"]).groupby(one["scene"]).mean()
     assert table.loc["dtg", "difference"] == pytest.approx(rooms.mean())
     assert (table["low"] < table["difference"]).all()
     assert (table["difference"] < table["high"]).all()
     # A constant gain is known exactly, however much the episodes differ.
     better = one.assign(dtg=one["dtg"] - 0.5)
-    gain = compare(better, one).set_index("figure").loc["dtg"]
+    gain = compare(better, one).set_index("metric").loc["dtg"]
     assert np.allclose(gain[["difference", "low", "high"]].to_numpy(dtype=float), -0.5)
 
 

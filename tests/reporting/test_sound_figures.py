@@ -29,7 +29,7 @@ def test_locations_are_drawn_where_they_are_heard() -> None:
     for dots, count in zip(axes.collections, (seen.sum(), (~seen).sum()), strict=True):
         assert len(dots.get_offsets()) == count
         np.testing.assert_allclose(dots.get_offsets(), [[0.5, 0.5]] * count, atol=1e-6)
-    assert axes.get_legend_handles_labels()[1][0] == "heard in sight: median 0.0 m off"
+    assert axes.get_legend_handles_labels()[1][0] == "estimates in sight: median error 0.0 m"
 
 
 def test_spectrogram_shows_each_picture_on_the_scale_of_both_ears() -> None:

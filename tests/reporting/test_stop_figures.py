@@ -18,8 +18,8 @@ def test_roc_of_hand_made_scores() -> None:
 def test_calibration_is_drawn_where_something_was_said() -> None:
     axes = Figure().add_subplot()
     reliability(axes, np.array([0.9, 0.9, 0.9, 0.1]), np.array([1, 0, 0, 0]))
-    said, found = axes.lines[1].get_data()
-    assert said.tolist() == pytest.approx([0.1, 0.9])
+    prediction, found = axes.lines[1].get_data()
+    assert prediction.tolist() == pytest.approx([0.1, 0.9])
     assert found.tolist() == pytest.approx([0, 1 / 3])
 
 

@@ -38,6 +38,6 @@ def test_estimates_are_drawn_where_they_were_heard() -> None:
 def test_an_agent_that_does_not_hear_has_no_estimates() -> None:
     trace = walked(RandomWalk(), [0])[0]
     # its simulator lets it hear, and it does not listen; one without ears:
-    deaf = type(trace)(**{**vars(trace), "heard": None})
-    with pytest.raises(ValueError, match="did not hear"):
+    deaf = type(trace)(**{**vars(trace), "source_estimates": None})
+    with pytest.raises(ValueError, match="no source estimates"):
         estimate_figure(deaf, "random_walk")

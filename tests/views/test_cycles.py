@@ -38,7 +38,7 @@ def test_without_blender_one_line_says_what_to_install(monkeypatch):
 )
 def test_both_renderers_find_the_same_light(plan, monkeypatch):
     """A lamp's globe keeps some light off the ceiling's reflection in Blender alone."""
-    monkeypatch.setattr("avn.views.building.hangings", lambda *_: ())
+    monkeypatch.setattr("avn.views.building.wall_pictures", lambda *_: ())
     light = LightConfig(spacing=0.15, shadow_rays=32)
     ray = Raycast(RaycastConfig(camera=CAMERA, samples=4, light=light), plan, "train")
     cfg = CyclesConfig(camera=CAMERA, samples=64, bounces=5, denoise=False)

@@ -22,14 +22,14 @@ def lamp(centre, intensity, radius=0.05):
 
 def room(size, spacing):
     """The inner faces of a box from the origin, as a building's."""
-    shell = boxes(np.zeros((1, 3)), np.array([size], float), np.ones((1, 3)), np.array([-1]))
+    building = boxes(np.zeros((1, 3)), np.array([size], float), np.ones((1, 3)), np.array([-1]))
     inside = Mesh(
-        np.ascontiguousarray(shell.vertices[:, ::-1]),
-        shell.uv,
-        shell.texture,
-        shell.colour,
+        np.ascontiguousarray(building.vertices[:, ::-1]),
+        building.uv,
+        building.texture,
+        building.colour,
         (),
-        shell.piece,
+        building.piece,
     )
     return split(inside, spacing * 1.42)[0]
 
@@ -45,8 +45,8 @@ def floor(half, spacing):
 def baked(mesh, albedo, lamps, panes, cfg):
     points = choose_points(mesh, cfg.spacing)
     colour = np.full((len(mesh), 3), albedo, np.float32)
-    shade = np.ones(len(mesh), bool)
-    return bake(mesh, colour, shade, lamps, panes, cfg, points), points
+    occluder = np.ones(len(mesh), bool)
+    return bake(mesh, colour, occluder, lamps, panes, cfg, points), points
 
 
 def test_light_of_a_lamp_falls_with_the_cosine_and_the_square_of_the_distance():

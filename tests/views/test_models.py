@@ -56,7 +56,7 @@ def fill_of(vertices: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float
     x, y = np.meshgrid(*(lower[i] + step * (upper[i] - lower[i]) for i in (0, 1)))
     origins = np.stack((x.ravel(), y.ravel(), np.full(x.size, upper[2] + 1.0)), axis=-1)
     down = np.tile(np.array([[0.0, 0.0, -1.0]], dtype=np.float32), (len(origins), 1))
-    hits = Triangles(vertices).meet(origins.astype(np.float32), down)
+    hits = Triangles(vertices).intersect(origins.astype(np.float32), down)
     return float((hits.triangle >= 0).mean())
 
 
@@ -147,8 +147,8 @@ def test_same_apartment_same_triangles_and_another_look_other_ones() -> None:
         if field.name != "textures":
             assert getattr(one, field.name).tobytes() == getattr(same, field.name).tobytes()
     assert [t.tobytes() for t in one.textures] == [t.tobytes() for t in same.textures]
-    looks = {furniture_mesh(plan, "train", look).vertices.tobytes() for look in range(4)}
-    assert len(looks) > 1
+    variants = {furniture_mesh(plan, "train", seed).vertices.tobytes() for seed in range(4)}
+    assert len(variants) > 1
 
 
 def test_the_hash_of_the_models_is_of_their_files(tmp_path, monkeypatch) -> None:

@@ -32,7 +32,7 @@ def flat():
 
 @pytest.mark.parametrize("heading", range(4))
 def test_depth_of_a_bare_room_is_the_distance_along_the_axis(bare, heading, monkeypatch):
-    monkeypatch.setattr("avn.views.building.hangings", lambda *_: ())
+    monkeypatch.setattr("avn.views.building.wall_pictures", lambda *_: ())
     camera = small(32)
     place = np.array((1.5, 1.0))
     _, depth = Raycast(camera, bare, "train").views(place[None], np.array([heading]))
@@ -47,7 +47,7 @@ def test_depth_of_a_bare_room_is_the_distance_along_the_axis(bare, heading, monk
     np.testing.assert_allclose(depth[0], expected, rtol=2e-3)
 
 
-def test_lamps_hang_in_the_picture_and_shine(bare):
+def test_lamps_are_visible_and_bright(bare):
     cfg = small(32, pitch=20.0)
     rgb, depth = Raycast(cfg, bare, "train").views(np.array([(2.0, 0.3)]), np.array([0]))
     near = depth[0] < 1.35
@@ -76,11 +76,11 @@ def test_what_was_prepared_gives_the_same_bytes(flat):
             assert a.tobytes() == b.tobytes()
 
 
-def test_another_look_and_another_part_look_different(flat):
+def test_views_differ_by_appearance_seed_and_part(flat):
     centres, headings = build_grid(flat).centres[:4], np.arange(4)
     made = [
-        Raycast(small(), flat, part, look).views(centres, headings)
-        for part, look in (("train", 0), ("train", 1), ("test", 0))
+        Raycast(small(), flat, part, appearance_seed).views(centres, headings)
+        for part, appearance_seed in (("train", 0), ("train", 1), ("test", 0))
     ]
     for other in made[1:]:
         assert np.abs(made[0][0].astype(int) - other[0]).mean() > 8
@@ -119,7 +119,7 @@ def test_rays_find_the_furniture_where_grid_and_acoustics_have_it():
         top = np.full_like(u, piece.z + piece.height + 0.01)
         origins = np.stack((x0 + u * (x1 - x0), y0 + v * (y1 - y0), top), axis=1)
         down = np.tile(np.array((0, 0, -1), np.float32), (len(u), 1))
-        hits = triangles.meet(origins.astype(np.float32), down)
+        hits = triangles.intersect(origins.astype(np.float32), down)
         found = (hits.triangle >= 0) & (hits.distance < piece.height + 0.02)
         found &= pieces[np.maximum(hits.triangle, 0)] == index
         assert found.mean() >= 0.8, piece.kind

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from avn.apartments.splits import PARTS
-from avn.views.pools import COLOURS, LAYOUTS, LIGHT
+from avn.views.appearance_palettes import COLOURS, LAYOUTS, LIGHT
 from avn.views.textures import PIXELS, outdoors, pattern
 
 MATERIALS = (

@@ -17,7 +17,7 @@ from avn.core.actions import HEADINGS
 from avn.core.pose import FRONT, RIGHT, turned
 from avn.mapping.base import Mapper
 from avn.navigation.simulator import Simulator, drawn_realisations
-from avn.navigation.trace import Thoughts, Trace
+from avn.navigation.trace import BeliefTrace, Trace
 
 # Squares beyond the outermost cells that a picture of a belief still shows.
 MARGIN = 2
@@ -32,15 +32,13 @@ class Recorder:
         By room, the places of the episodes in its batch.
     realisations : int
         How many takes of each clip there are.
-    thoughts : bool
+    beliefs : bool
         Whether it also keeps what agents with maps took to be true.
     """
 
-    def __init__(
-        self, rows: Mapping[str, Sequence[int]], realisations: int, thoughts: bool
-    ) -> None:
+    def __init__(self, rows: Mapping[str, Sequence[int]], realisations: int, beliefs: bool) -> None:
         self._rows = {room: torch.as_tensor(list(own)).long() for room, own in rows.items()}
-        self._realisations, self._thinks = realisations, thoughts
+        self._realisations, self._keeps_beliefs = realisations, beliefs
         self._steps: dict[str, list[dict[str, Tensor]]] = {}
         self._rooms: dict[str, tuple[Simulator, bool]] = {}
         self._frames: dict[str, _Frames] = {}
@@ -58,16 +56,16 @@ class Recorder:
         step = {"state": simulator.state[rows], "collided": observation["collided"][rows]}
         sound = observation.get("source_estimate", None)
         if sound is not None and sound.dim() == 2 and sound.shape[1] == 2:
-            step["heard"] = sound[rows]
+            step["source_estimates"] = sound[rows]
         if actions is not None:
             step["action"] = actions[rows]
             mapper = getattr(agent, "mapper", None)
-            if self._thinks and isinstance(mapper, Mapper):
-                step |= self._thought(simulator, mapper, rows)
+            if self._keeps_beliefs and isinstance(mapper, Mapper):
+                step |= self._beliefs(simulator, mapper, rows)
         self._steps.setdefault(room, []).append({key: x.clone() for key, x in step.items()})
         return bool(simulator.done[rows].all())
 
-    def _thought(self, simulator: Simulator, mapper: Mapper, rows: Tensor) -> dict[str, Tensor]:
+    def _beliefs(self, simulator: Simulator, mapper: Mapper, rows: Tensor) -> dict[str, Tensor]:
         """What a mapper holds true now, in the apartment's frame."""
         room = simulator.place.name
         if room not in self._frames:
@@ -88,21 +86,26 @@ class Recorder:
         count = int(simulator.actions[row])
         steps = self._steps[room]
 
-        def told(key: str, length: int) -> NDArray[Any] | None:
+        def stacked(key: str, length: int) -> NDArray[Any] | None:
             if key not in steps[0]:
                 return None
             return np.stack([step[key][at].numpy() for step in steps[:length]])
 
-        state, heard = told("state", count + 1), told("heard", count + 1)
-        episodes, pose = simulator.episodes, told("pose", count)
+        state, source_estimates = (
+            stacked("state", count + 1),
+            stacked("source_estimates", count + 1),
+        )
+        episodes, pose = simulator.episodes, stacked("pose", count)
         assert state is not None
-        if heard is not None:
-            offsets = turned(torch.from_numpy(heard).double(), torch.from_numpy(state % HEADINGS))
-            heard = simulator.place.grid.centres[state // HEADINGS] + offsets.numpy()
-        thoughts = None
+        if source_estimates is not None:
+            offsets = turned(
+                torch.from_numpy(source_estimates).double(), torch.from_numpy(state % HEADINGS)
+            )
+            source_estimates = simulator.place.grid.centres[state // HEADINGS] + offsets.numpy()
+        beliefs = None
         if pose is not None:
-            own = [told(key, count) for key in ("free", "similarity", "retrieved")]
-            thoughts = Thoughts(pose, self._frames[room].low, *own)
+            own = [stacked(key, count) for key in ("free", "similarity", "retrieved")]
+            beliefs = BeliefTrace(pose, self._frames[room].low, *own)
         draws = simulator.protocol.max_actions + 1
         # one episode's draws are asked for, so that a room with thousands costs no more
         realisations = drawn_realisations(episodes, draws, self._realisations, [row])[
@@ -114,11 +117,11 @@ class Recorder:
             sound=int(episodes.sound[row]),
             source=int(episodes.source[row]),
             state=state,
-            action=np.asarray(told("action", count)),
-            collided=np.asarray(told("collided", count + 1)),
+            action=np.asarray(stacked("action", count)),
+            collided=np.asarray(stacked("collided", count + 1)),
             realisation=realisations.numpy().astype(np.int64),
-            heard=heard,
-            thoughts=thoughts,
+            source_estimates=source_estimates,
+            beliefs=beliefs,
             walk=episodes.walks[episodes.walk[row]] if explores else None,
         )
 

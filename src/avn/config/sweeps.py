@@ -96,10 +96,10 @@ def _spread(records: list[dict[str, Any]]) -> pd.DataFrame:
 
 def _print(summary: pd.DataFrame) -> None:
     for row in summary[summary["scene"] == AVERAGE].to_dict("records"):
-        figures = ", ".join(
-            f"{figure.upper()} {100 * row[figure]:.1f}"
-            + (f" +- {100 * row[figure + '_std']:.1f} %" if row["seeds"] > 1 else " %")
-            for figure in ("sr", "spl")
+        metrics = ", ".join(
+            f"{metric.upper()} {100 * row[metric]:.1f}"
+            + (f" +- {100 * row[metric + '_std']:.1f} %" if row["seeds"] > 1 else " %")
+            for metric in ("sr", "spl")
         )
         labels = f"{row['agent']}, {row['sound']} ({row['setting'] or 'defaults'})"
-        log(f"{labels}, {row['seeds']} seeds: {figures}")
+        log(f"{labels}, {row['seeds']} seeds: {metrics}")

@@ -38,7 +38,7 @@ class ViewsFile:
         The apartment.
     part : {"train", "validation", "test"}
         Pool of models, patterns and light.
-    look : int
+    appearance_seed : int
         Index of the draw from the pool.
     path : Path
         The file.
@@ -48,7 +48,7 @@ class ViewsFile:
 
     plan: FloorPlan
     part: str
-    look: int
+    appearance_seed: int
     path: Path
     fingerprint: str
 
@@ -134,7 +134,7 @@ def _renderings(lighting: _Lighting) -> list[_Rendering]:
 
 def _open(job: _Lighting, light: Prepared | None = None) -> Renderer:
     views = job.views
-    return renderer_class(job.cfg)(job.cfg, views.plan, views.part, views.look, light)
+    return renderer_class(job.cfg)(job.cfg, views.plan, views.part, views.appearance_seed, light)
 
 
 def _light(job: _Lighting) -> int:

@@ -14,7 +14,7 @@ from avn.navigation.place import Place
 
 
 @dataclass(frozen=True)
-class Thoughts:
+class BeliefTrace:
     """What an agent with a map took to be true at each of T steps, in the apartment's own frame.
 
     Attributes
@@ -56,9 +56,9 @@ class Trace:
         Whether the action before was a blocked move.
     realisation : (T + 1,) int64
         Which take of the clip of source, state and sound is heard.
-    heard : (T + 1, 2) float64, or None
+    source_estimates : (T + 1, 2) float64, or None
         East and north in metres of where the sound network took the source to be.
-    thoughts : Thoughts, or None
+    beliefs : BeliefTrace, or None
         Of an agent with a map.
     walk : (W,) int64, or None
         States of the exploration walk, where the agent was shown one.
@@ -72,8 +72,8 @@ class Trace:
     action: NDArray[np.int64]
     collided: NDArray[np.bool_]
     realisation: NDArray[np.int64]
-    heard: NDArray[np.float64] | None
-    thoughts: Thoughts | None
+    source_estimates: NDArray[np.float64] | None
+    beliefs: BeliefTrace | None
     walk: NDArray[np.int64] | None
 
     @property

@@ -28,9 +28,9 @@ from avn.modules.window_metrics import calibrated, window_metrics
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.trained import Fitted
 from avn.pipeline.views import RenderedViews
-from avn.reporting.window_figures import WindowFigures
+from avn.reporting.local_patch_figures import LocalPatchFigures
 from avn.views.camera import CameraConfig
-from avn.views.window import visible_cells
+from avn.views.local_patch_visibility import visible_cells
 
 # Views that are judged at once.
 BATCH = 64
@@ -56,8 +56,10 @@ class OccupancyNetwork(Fitted):
         super().check()
 
     def _views(self) -> list[RenderedViews]:
-        looks = range(self.cfg.occupancy_model.appearances)
-        train = [RenderedViews(self.cfg, self.train, look) for look in looks]
+        appearances = range(self.cfg.occupancy_model.appearances)
+        train = [
+            RenderedViews(self.cfg, self.train, appearance_seed) for appearance_seed in appearances
+        ]
         return [*train, RenderedViews(self.cfg, self.validation)]
 
     def needs(self) -> Sequence[Any]:
@@ -91,9 +93,9 @@ class OccupancyNetwork(Fitted):
 
     def data(self) -> ViewData:
         """Views and the true patches that they show."""
-        *looks, others = (own.load() for own in self._views())
+        *appearances, others = (own.load() for own in self._views())
         camera = typed(self.cfg.renderer.camera)
-        train = zip(self.train.plans, *looks, strict=True)
+        train = zip(self.train.plans, *appearances, strict=True)
         validation = zip(self.validation.plans, others, strict=True)
         return ViewData(
             [_seen(plan, camera, views) for plan, *views in train],
@@ -103,7 +105,7 @@ class OccupancyNetwork(Fitted):
 
     def callbacks(self) -> Sequence[Callback]:
         """What shows figures in TensorBoard."""
-        return (WindowFigures(),)
+        return (LocalPatchFigures(),)
 
     def measure(self, model: OccupancyCnn, data: ViewData) -> dict[str, Any]:
         """Figures over all views of the validation apartments, and those of the prior beside."""

@@ -25,9 +25,9 @@ from avn.reporting.table import wide_console
 
 HEARD, SEEN, PLACES = "source_estimates.csv", "local_patches.csv", "localisation.csv"
 TABLES = {
-    HEARD: perception_tables.heard_table,
-    SEEN: perception_tables.windows_table,
-    PLACES: perception_tables.places_table,
+    HEARD: perception_tables.source_estimates_table,
+    SEEN: perception_tables.local_patches_table,
+    PLACES: perception_tables.localisation_table,
 }
 
 

@@ -176,7 +176,7 @@ def _values(key: str, settings: Sequence[Mapping[str, str]]) -> set[str]:
     return {own[key] for own in settings if key in own}
 
 
-def traces(run: Run, labels: Sequence[int], thoughts: bool = True) -> list[Trace]:
+def traces(run: Run, labels: Sequence[int], beliefs: bool = True) -> list[Trace]:
     """Walk a run again, in the rooms of some episodes, and keep their traces.
 
     Parameters
@@ -184,7 +184,7 @@ def traces(run: Run, labels: Sequence[int], thoughts: bool = True) -> list[Trace
     run : Run
     labels : sequence of int
         Rows of `episodes.csv`.
-    thoughts : bool
+    beliefs : bool
         Whether what an agent with a map took to be true is kept too.
 
     Raises
@@ -192,7 +192,7 @@ def traces(run: Run, labels: Sequence[int], thoughts: bool = True) -> list[Trace
     UserError
         Where the walk is another than the one that the run recorded.
     """
-    (found,) = walk_again(run, [(labels, thoughts)])
+    (found,) = walk_again(run, [(labels, beliefs)])
     return found
 
 
@@ -204,8 +204,8 @@ def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[l
     # in a batch the episodes of a room stand in the order of its records
     rows = run.episodes.groupby("scene").cumcount()
     recorders = [
-        Recorder(_by_room(run, rows, labels), run.cfg.realisations, thoughts)
-        for labels, thoughts in explicit
+        Recorder(_by_room(run, rows, labels), run.cfg.realisations, beliefs)
+        for labels, beliefs in explicit
     ]
 
     def watch(*step: Any) -> bool:

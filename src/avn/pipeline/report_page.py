@@ -83,7 +83,7 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
         if labels or paths:
             log(f"{run.folder}: walking {'all' if paths else len(labels)} episodes again")
         # the runs of several seeds taken together stand first
-        embedded, ways = media.add(run, len(groups) + index, labels, paths)
+        embedded, walked_paths = media.add(run, len(groups) + index, labels, paths)
         pages.append(
             page.PageRun(
                 name=names[index],
@@ -93,7 +93,7 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
                 results=run.results,
                 episodes=run.episodes,
                 media=embedded,
-                ways=ways,
+                paths=walked_paths,
                 within=index in within,
             )
         )
@@ -135,7 +135,7 @@ def _together(runs: Sequence[Run], pages: Sequence[page.PageRun]) -> page.PageRu
         results=summarise(episodes.assign(seed=0)),
         episodes=episodes,
         media=media,
-        ways=[way for own in pages for way in own.ways or []] or None,
+        paths=[path for own in pages for path in own.paths or []] or None,
         seeds=across_seeds(pd.concat([own.results for own in pages])),
     )
 
@@ -183,8 +183,8 @@ class _Media:
             return {}, None
         every = run.episodes.index.tolist() if paths else []
         traces, walked = replay.walk_again(run, [(labels, True), (every, False)])
-        ways = [{"plan": self._plan(own), "states": own.state.tolist()} for own in walked]
-        return self._embed(run, index, labels, traces), ways or None
+        found = [{"plan": self._plan(own), "states": own.state.tolist()} for own in walked]
+        return self._embed(run, index, labels, traces), found or None
 
     def _embed(
         self, run: Run, index: int, labels: Sequence[int], traces: Sequence[Trace]

@@ -166,12 +166,12 @@ def _write(
 def _compare(episodes: pd.DataFrame) -> None:
     """Print how much better each row is than the one before it, over the same episodes."""
     rows = list(dict.fromkeys(episodes["agent"]))
-    figures = [*results.FIGURES.values()]
+    metrics = [*results.METRICS.values()]
     keys = ["agent", "sound", "scene", "seed", "episode", "source", "start_cell", "start_heading"]
-    mean = episodes.groupby(keys, as_index=False)[figures].mean()  # over networks
+    mean = episodes.groupby(keys, as_index=False)[metrics].mean()  # over networks
     for one, other in zip(rows[1:], rows, strict=False):
         differences = results.compare(mean[mean["agent"] == one], mean[mean["agent"] == other])
-        spl = differences.set_index("figure").loc["spl"] * 100
+        spl = differences.set_index("metric").loc["spl"] * 100
         log(
             f"{one} less {other}: SPL {spl['difference']:+.1f} points "
             f"(95 % interval {spl['low']:+.1f} to {spl['high']:+.1f})"

@@ -259,9 +259,9 @@ def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
     if "source" in cfg.planner:
         settings["source_filter"] = cfg.planner.source_filter
     settings["sounds"] = "-".join(sound_files(cfg))
-    figures = results.headline(summary)
+    metrics = results.headline(summary)
     with SummaryWriter(str(folder)) as writer:
         for row in summary.itertuples():
-            for name in figures:
+            for name in metrics:
                 writer.add_scalar(f"{name}/{row.sound}/{row.scene}", getattr(row, name), cfg.seed)
-        writer.add_hparams(settings, figures, run_name=".")
+        writer.add_hparams(settings, metrics, run_name=".")

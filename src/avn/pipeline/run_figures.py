@@ -14,8 +14,8 @@ from avn.core.progress import log
 from avn.navigation.trace import Trace
 from avn.pipeline import replay
 from avn.pipeline.replay import Run
+from avn.reporting.belief_figures import belief_figure, memory_figure
 from avn.reporting.breakdown import breakdown_figure
-from avn.reporting.thought_figures import belief_figure, memory_figure
 from avn.reporting.trajectory_figures import estimate_figure, trajectory_figure
 
 FOLDER = "figures"

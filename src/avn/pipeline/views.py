@@ -32,15 +32,15 @@ class RenderedViews(PerApartment):
     ----------
     cfg : DictConfig
     apartments : Apartments
-    look : int
+    appearance_seed : int
         Which draw of furniture, patterns and light from the pool of their part.
     """
 
     kind = "generate/views"
 
-    def __init__(self, cfg: DictConfig, apartments: Apartments, look: int = 0) -> None:
+    def __init__(self, cfg: DictConfig, apartments: Apartments, appearance_seed: int = 0) -> None:
         super().__init__(cfg, apartments)
-        self.look = look
+        self.appearance_seed = appearance_seed
 
     def settings(self) -> Sequence[str]:
         """What renders them."""
@@ -48,7 +48,7 @@ class RenderedViews(PerApartment):
 
     def content(self) -> Any:
         """The pool, the draw from it, and the assets."""
-        return self.apartments.part, self.look, assets_hash()
+        return self.apartments.part, self.appearance_seed, assets_hash()
 
     def content_of(self, plan: FloorPlan) -> Any:
         """The floor plan."""
@@ -59,7 +59,7 @@ class RenderedViews(PerApartment):
         """What it is."""
         name = self.cfg.renderer.name
         return f"views of {self.apartments.title} ({name}" + (
-            f", look {self.look})" if self.look else ")"
+            f", appearance {self.appearance_seed})" if self.appearance_seed else ")"
         )
 
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
@@ -86,7 +86,7 @@ class RenderedViews(PerApartment):
             ViewsFile(
                 self.apartments.plans[i],
                 self.apartments.part,
-                self.look,
+                self.appearance_seed,
                 self.paths[i],
                 self.fingerprints[i],
             )

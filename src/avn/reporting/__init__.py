@@ -1,0 +1,1 @@
+"""Tables, figures, films and report pages of results."""

@@ -1,4 +1,4 @@
-"""Results by how hard the start was: distance, sight, rooms crossed."""
+"""Results by difficulty of the start: distance, line of sight, rooms crossed."""
 
 from __future__ import annotations
 
@@ -13,37 +13,38 @@ from avn.core.errors import UserError
 from avn.navigation.metrics import cluster_bootstrap
 from avn.reporting.trajectory_figures import RUN_COLOURS, figure_of
 
-# Metres from which each group of distances counts.
+# Lower bounds of the groups of distances, metres.
 DISTANCES = (0, 2, 4, 6, 8, 10)
 KINDS = ("distance", "sight", "rooms")
 TITLES = {
-    "distance": "metres to walk to the source",
+    "distance": "geodesic distance to the source, m",
     "sight": "source at the start",
     "rooms": "doorways between start and source",
 }
 
 
 def breakdown(episodes: pd.DataFrame, kind: str, draws: int = 1000) -> pd.DataFrame:
-    """Success rate and SPL by one property of the start.
+    """Compute success rate and SPL by one property of the start.
 
     Parameters
     ----------
     episodes : DataFrame
         Records as in `episodes.csv`.
     kind : {"distance", "sight", "rooms"}
+        Property by which episodes are grouped.
     draws : int
-        Resamples of the bootstrap over (room, source) clusters.
+        Bootstrap resamples over (scene, source) clusters.
 
     Returns
     -------
     DataFrame
-        `group`, in words; `episodes`; `sr`, `spl` and their 95 % intervals `sr_low`, ... Groups
-        without an episode are left out.
+        `group`, a label; `episodes`, their number; `sr` and `spl`, 0 to 1, with 95 % confidence
+        intervals `sr_low`, `sr_high`, `spl_low`, `spl_high`. Empty groups are left out.
 
     Raises
     ------
     UserError
-        For another kind.
+        If the kind is unknown.
     """
     if kind not in KINDS:
         raise UserError(f"breakdown: '{kind}' is none of {', '.join(KINDS)}")
@@ -54,15 +55,15 @@ def breakdown(episodes: pd.DataFrame, kind: str, draws: int = 1000) -> pd.DataFr
         means = values.mean(axis=0)
         low, high = cluster_bootstrap(values, clusters, draws=draws)
         row: dict[str, object] = {"group": str(name), "episodes": len(part)}
-        for index, figure in enumerate(("sr", "spl")):
-            row |= {figure: means[index], f"{figure}_low": low[index]}
-            row[f"{figure}_high"] = high[index]
+        for index, metric in enumerate(("sr", "spl")):
+            row |= {metric: means[index], f"{metric}_low": low[index]}
+            row[f"{metric}_high"] = high[index]
         rows.append(row)
     return pd.DataFrame(rows)
 
 
 def _groups(episodes: pd.DataFrame, kind: str) -> pd.Series:
-    """The group of each episode, in an order of their own."""
+    """Return the group of each episode as an ordered categorical."""
     if kind == "sight":
         words = np.where(episodes["in_sight"] == 1, "in sight", "out of sight")
         order = ["in sight", "out of sight"]
@@ -86,9 +87,9 @@ def breakdown_figure(
     Parameters
     ----------
     runs : mapping of str to DataFrame
-        Records by the run's name.
+        Records of each run by its name.
     colours : sequence of str
-        Of the runs.
+        Colours of the runs.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Views of an apartment side by side, to be looked at."""
+"""Contact sheets: labelled views of an apartment in a grid."""
 
 from __future__ import annotations
 
@@ -17,12 +17,20 @@ COLUMNS = 8
 
 
 def sheet_states(plan: FloorPlan, grid: Grid, places: int = 2) -> list[int]:
-    """States that show every room: all headings at some of its cells, far from one another.
+    """Choose states that show every room: all headings at some distant cells.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+    grid : Grid
+    places : int
+        Cells per room. The first is the most central, each further one the farthest from those
+        before.
 
     Returns
     -------
     list of int
-        4 x cell + heading; `places` cells a room, four headings each.
+        4 x cell + heading, four headings per cell.
     """
     chosen = []
     for room in range(len(plan.rooms)):
@@ -41,16 +49,16 @@ def sheet_states(plan: FloorPlan, grid: Grid, places: int = 2) -> list[int]:
 def contact_sheet(
     plan: FloorPlan, grid: Grid, states: list[int], pictures: NDArray[np.uint8]
 ) -> Image.Image:
-    """A grid of labelled pictures.
+    """Draw a grid of labelled views.
 
     Parameters
     ----------
     plan : FloorPlan
     grid : Grid
     states : list of int
-        N of them.
+        N states, 4 x cell + heading.
     pictures : (N, H, W, 3) uint8
-        The view of each.
+        Their views, sRGB.
     """
     high, wide = pictures.shape[1:3]
     rows = -(-len(states) // COLUMNS)
@@ -68,6 +76,15 @@ def contact_sheet(
 def save_contact_sheet(
     plan: FloorPlan, grid: Grid, pictures: NDArray[np.uint8], path: Path
 ) -> None:
-    """Write the sheet of all rooms as a PNG, from the pictures (S, H, W, 3) of all states."""
+    """Write the contact sheet of all rooms as a PNG.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+    grid : Grid
+    pictures : (S, H, W, 3) uint8
+        Views of all states, sRGB.
+    path : Path
+    """
     states = sheet_states(plan, grid)
     contact_sheet(plan, grid, states, np.asarray(pictures)[states]).save(path)

@@ -1,4 +1,4 @@
-"""Films of episodes: what the agent sees, hears and believes, a second for each action."""
+"""Films of episodes: view, sound and beliefs of the agent, one second per action."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from avn.core.actions import HEADINGS
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
 from avn.modules.spectrogram import Spectrogram
-from avn.navigation.trace import Thoughts, Trace
+from avn.navigation.trace import BeliefTrace, Trace
 from avn.reporting.sound_figures import draw_plan
 from avn.reporting.trajectory_figures import draw_place, extent, outcome, plan_of, title_of
 
-# Frames a second; a cursor runs over the spectrogram, and nothing else moves within a second.
+# Frames per second. Only the cursor on the spectrograms moves within a second.
 FPS = 5
 SIZE = (1280, 720)
 ACTIONS = ("forward", "backward", "turn left", "turn right", "Stop")
-_PATH, _HEARD = "#e0218a", "#1f6fb2"
+_PATH, _ESTIMATE = "#e0218a", "#1f6fb2"
 
 
 def write_film(
@@ -48,17 +48,18 @@ def write_film(
     path : Path
     trace : Trace
     name : str
-        Of the run.
+        Name of the run.
     views : (T + 1, H, W, 3) uint8
+        View at each step, sRGB.
     clips : (T + 1, 2, rate) float32 tensor
-        What is heard at each step, for the spectrogram.
+        Binaural clip at each step, for the spectrograms.
     track : (rate (T + 1), 2) float32
-        The same as the film's sound; see `avn.pipeline.observed.soundtrack`.
+        Soundtrack; see `avn.pipeline.observed.soundtrack`.
 
     Raises
     ------
     UserError
-        Where it cannot be encoded.
+        If the film cannot be encoded.
     """
     with atomic_write(path) as part, tempfile.TemporaryDirectory() as folder:
         wave = Path(folder) / "sound.wav"
@@ -72,7 +73,7 @@ def write_film(
             audio_path=str(wave),
             audio_codec="aac",
             ffmpeg_log_level="error",
-            # the name that the file has while it is written does not tell its format
+            # the format is explicit because the temporary file has another suffix
             output_params=["-ar", "48000", "-b:a", "192k", "-movflags", "+faststart", "-f", "mp4"],
         )
         try:
@@ -89,7 +90,23 @@ def write_film(
 def frames(
     trace: Trace, name: str, views: NDArray[np.uint8], clips: Tensor
 ) -> Iterator[NDArray[np.uint8]]:
-    """The pictures of a film, (720, 1280, 3) uint8, `FPS` for each step."""
+    """Generate the frames of a film, `FPS` per step.
+
+    Parameters
+    ----------
+    trace : Trace
+    name : str
+        Name of the run.
+    views : (T + 1, H, W, 3) uint8
+        View at each step, sRGB.
+    clips : (T + 1, 2, 16000) float32 tensor
+        Binaural clip at each step at 16 kHz.
+
+    Yields
+    ------
+    (720, 1280, 3) uint8
+        sRGB.
+    """
     stage = _Stage(trace, name, views, clips)
     for step in range(len(trace.state)):
         picture = stage.draw(step)
@@ -98,7 +115,7 @@ def frames(
 
 
 class _Stage:
-    """The figure that every frame is drawn on."""
+    """Figure on which all frames are drawn."""
 
     def __init__(self, trace: Trace, name: str, views: NDArray[np.uint8], clips: Tensor) -> None:
         self.trace, self.views = trace, views
@@ -107,13 +124,13 @@ class _Stage:
         self.view = self._panel(12, 258, 450, 450)
         self.picture = self.view.imshow(views[0], interpolation="bicubic")
         pictures = Spectrogram(scale="mel", frames=100, interaural=False)(clips)
-        self.pictures = torch.flip(pictures, dims=(2,)).numpy()  # low tones at the bottom
+        self.pictures = torch.flip(pictures, dims=(2,)).numpy()  # low frequencies at the bottom
         low, high = np.quantile(self.pictures, (0.02, 0.998))
         self.ears = [self._panel(62, 136, 400, 104), self._panel(62, 22, 400, 104)]
         self.sounds = []
         for ear, (axes, word) in enumerate(zip(self.ears, ("left", "right"), strict=True)):
-            look: dict[str, Any] = {"aspect": "auto", "cmap": "magma", "vmin": low, "vmax": high}
-            self.sounds.append(axes.imshow(self.pictures[0, ear], **look))
+            style: dict[str, Any] = {"aspect": "auto", "cmap": "magma", "vmin": low, "vmax": high}
+            self.sounds.append(axes.imshow(self.pictures[0, ear], **style))
             axes.set_ylabel(f"{word} ear", fontsize=10)
         self.map = self._panel(484, 60, 784, 560)
         self._draw_map()
@@ -123,7 +140,7 @@ class _Stage:
         self._legend()
 
     def _panel(self, left: int, bottom: int, width: int, height: int) -> Axes:
-        """Axes without ticks at a place in pixels."""
+        """Add axes without ticks; position and size are in pixels."""
         (w, h) = SIZE
         axes: Axes = self.figure.add_axes((left / w, bottom / h, width / w, height / h))
         axes.set(xticks=[], yticks=[])
@@ -131,13 +148,13 @@ class _Stage:
 
     def _draw_map(self) -> None:
         trace, axes = self.trace, self.map
-        thoughts = trace.thoughts
-        free = None if thoughts is None else thoughts.free
+        beliefs = trace.beliefs
+        free = None if beliefs is None else beliefs.free
         self.belief = None
-        if thoughts is not None and free is not None:
-            look: dict[str, Any] = {"cmap": "BrBG", "vmin": 0, "vmax": 255, "zorder": -1}
-            place = extent(thoughts.low, free.shape[1:])
-            self.belief = axes.imshow(free[0], origin="lower", extent=place, alpha=0.75, **look)
+        if beliefs is not None and free is not None:
+            style: dict[str, Any] = {"cmap": "BrBG", "vmin": 0, "vmax": 255, "zorder": -1}
+            place = extent(beliefs.low, free.shape[1:])
+            self.belief = axes.imshow(free[0], origin="lower", extent=place, alpha=0.75, **style)
         plan = plan_of(trace)
         if self.belief is None or plan is None:
             draw_place(axes, trace)
@@ -156,29 +173,31 @@ class _Stage:
         (x0, y0), (x1, y1) = centres.min(0) - 1.2, centres.max(0) + 1.2
         axes.set(xlim=(x0, x1), ylim=(y0, y1))
         self.recalled = None
-        if thoughts is not None and thoughts.retrieved is not None and trace.walk is not None:
+        if beliefs is not None and beliefs.retrieved is not None and trace.walk is not None:
             walk = centres[trace.walk // HEADINGS]
             axes.plot(*walk.T, color="0.45", lw=0.9, zorder=7)
             (self.recalled,) = axes.plot([], [], "o", color="#7b3294", ms=8, alpha=0.8, zorder=8)
         (self.path,) = axes.plot([], [], color=_PATH, lw=2.6, zorder=9)
         (self.bumps,) = axes.plot([], [], "x", color="black", markersize=6, zorder=10)
         (self.agent,) = axes.plot([], [], color="white", mec=_PATH, mew=2.5, ms=18, zorder=11)
-        (self.ray,) = axes.plot([], [], color=_HEARD, lw=1, ls=":", zorder=8)
-        (self.heard,) = axes.plot([], [], "P", color=_HEARD, mec="white", markersize=14, zorder=13)
+        (self.ray,) = axes.plot([], [], color=_ESTIMATE, lw=1, ls=":", zorder=8)
+        (self.estimate,) = axes.plot(
+            [], [], "P", color=_ESTIMATE, mec="white", markersize=14, zorder=13
+        )
 
     def _legend(self) -> None:
         words = ["star: the source"]
-        if self.trace.heard is not None:
-            words.append("blue cross: where it hears the source")
+        if self.trace.source_estimates is not None:
+            words.append("blue cross: source estimate")
         if self.belief is not None:
-            words.append("green: believed to be free, brown: blocked")
+            words.append("occupancy belief: green free, brown blocked")
         self.figure.text(484 / 1280, 34 / 720, "    ".join(words), fontsize=10, color="0.3")
         if self.recalled is not None:
-            memory = "grey: the walk that it remembers, purple: places there that look most alike"
+            memory = "grey: exploration walk in memory, purple: most similar memory entries"
             self.figure.text(484 / 1280, 12 / 720, memory, fontsize=10, color="0.3")
 
     def draw(self, step: int) -> NDArray[np.uint8]:
-        """The picture of one step, (720, 1280, 3) uint8."""
+        """Draw one step, (720, 1280, 3) uint8."""
         trace = self.trace
         self.picture.set_data(self.views[step])
         for ear, image in enumerate(self.sounds):
@@ -187,33 +206,33 @@ class _Stage:
         self.path.set_data(*trace.path[: step + 1].T)
         self.bumps.set_data(*trace.path[: step + 1][trace.collided[: step + 1]].T)
         self.agent.set_data(*here[:, None])
-        # a triangle that points where it looks, 0 degrees to the north and counter-clockwise
+        # a triangle that points along the heading; its angle is counter-clockwise from north
         self.agent.set_marker((3, 0, -90.0 * (trace.state[step] % HEADINGS)))
-        if trace.heard is not None:
-            self.heard.set_data(*trace.heard[step][:, None])
-            self.ray.set_data(*np.stack((here, trace.heard[step])).T)
-        if trace.thoughts is not None:
-            self._believe(trace.thoughts, min(step, len(trace.action) - 1))
+        if trace.source_estimates is not None:
+            self.estimate.set_data(*trace.source_estimates[step][:, None])
+            self.ray.set_data(*np.stack((here, trace.source_estimates[step])).T)
+        if trace.beliefs is not None:
+            self._believe(trace.beliefs, min(step, len(trace.action) - 1))
         self.caption.set_text(self._words(step))
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
 
-    def _believe(self, thoughts: Thoughts, step: int) -> None:
-        """Show what the agent took to be true when it chose its action."""
-        if self.belief is not None and thoughts.free is not None:
-            self.belief.set_data(thoughts.free[step])
-        if self.recalled is not None and thoughts.retrieved is not None:
-            self.recalled.set_data(*thoughts.retrieved[step, :, :2].T)
+    def _believe(self, beliefs: BeliefTrace, step: int) -> None:
+        """Show the agent's beliefs at the time of its action."""
+        if self.belief is not None and beliefs.free is not None:
+            self.belief.set_data(beliefs.free[step])
+        if self.recalled is not None and beliefs.retrieved is not None:
+            self.recalled.set_data(*beliefs.retrieved[step, :, :2].T)
 
     def _words(self, step: int) -> str:
         count = len(self.trace.action)
         if step == count:
             return outcome(self.trace)
-        bumped = " (ran into something)" if self.trace.collided[step] else ""
-        return f"action {step + 1} of {count}: {ACTIONS[self.trace.action[step]]}{bumped}"
+        collision = " (collision)" if self.trace.collided[step] else ""
+        return f"action {step + 1} of {count}: {ACTIONS[self.trace.action[step]]}{collision}"
 
     def with_cursor(self, picture: NDArray[np.uint8], share: float) -> NDArray[np.uint8]:
-        """The same with a line where in the second it is, over both spectrograms."""
+        """Add a cursor to both spectrograms at a share of the second."""
         marked = picture.copy()
         for axes in self.ears:
             box = axes.get_window_extent()

@@ -1,4 +1,4 @@
-"""A floor plan as a picture."""
+"""Figures of floor plans."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def draw_floor_plan(axes: Axes, plan: FloorPlan, grid: Grid | None = None) -> No
     axes : Axes
     plan : FloorPlan
     grid : Grid, optional
-        Built from the plan where it is not given.
+        Built from the plan by default.
     """
     grid = build_grid(plan) if grid is None else grid
     for room in plan.rooms:
@@ -67,7 +67,7 @@ def draw_floor_plan(axes: Axes, plan: FloorPlan, grid: Grid | None = None) -> No
             Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#333333", linewidth=0, zorder=3)
         )
     _draw_openings(axes, plan)
-    # What hangs is drawn as an outline over what stands.
+    # Wall-mounted pieces are drawn as outlines over those on the floor.
     for piece in sorted(plan.furniture, key=lambda piece: piece.z):
         _draw_piece(axes, piece)
     _draw_grid(axes, plan, grid)
@@ -110,7 +110,7 @@ def _draw_piece(axes: Axes, piece: Piece) -> None:
     )
     if hangs:
         return
-    # A tick from the centre to the side that it faces, and the kind across its longer side.
+    # A tick towards the front side, and the kind along the longer side.
     front = HEADINGS[piece.heading] * piece.depth / 2
     axes.plot(
         [piece.x + front[0] * 0.55, piece.x + front[0]],
@@ -127,7 +127,7 @@ def _draw_piece(axes: Axes, piece: Piece) -> None:
         ha="center",
         va="center",
         rotation=90 if y1 - y0 > x1 - x0 + 1e-6 else 0,
-        # A letter is some 0.6 of its size wide; a point is 1/72 inch.
+        # A letter is about 0.6 times as wide as the font size; a point is 1/72 inch.
         fontsize=min(7.0, 72 * _INCHES_A_METRE * longer / (0.6 * len(piece.kind))),
         zorder=6,
     )
@@ -151,7 +151,7 @@ def _draw_grid(axes: Axes, plan: FloorPlan, grid: Grid) -> None:
 
 
 def floor_plan_figure(plan: FloorPlan, grid: Grid | None = None) -> Figure:
-    """A figure with the floor plan alone, sized to its scale."""
+    """Draw a figure of a floor plan at a fixed scale; the grid is built from it by default."""
     width = max(r.x1 for r in plan.rooms) - min(r.x0 for r in plan.rooms) + 1.0
     height = max(r.y1 for r in plan.rooms) - min(r.y0 for r in plan.rooms) + 1.0
     figure = Figure(figsize=(width * _INCHES_A_METRE, height * _INCHES_A_METRE), dpi=_DPI)
@@ -162,9 +162,16 @@ def floor_plan_figure(plan: FloorPlan, grid: Grid | None = None) -> Figure:
 
 
 def save_floor_plan(plan: FloorPlan, path: Path, grid: Grid | None = None) -> None:
-    """Draw a floor plan into a PNG of few colours; the folder is made if it is missing.
+    """Write a floor plan as a PNG with a palette of 48 colours; missing folders are created.
 
-    The file carries no date or version, so that equal plans give equal bytes.
+    The file has no date or version, so that equal plans give equal bytes.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+    path : Path
+    grid : Grid, optional
+        Built from the plan by default.
     """
     buffer = io.BytesIO()
     floor_plan_figure(plan, grid).savefig(buffer, format="png", metadata={"Software": None})

@@ -1,4 +1,4 @@
-"""The card of a trained network: what it is, what it was trained on, how good it is."""
+"""Model cards of trained networks: data, metrics, configuration and limits."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import yaml
 from avn.core.files import atomic_write
 
 CARD = "model_card.md"
-# Headings after Mitchell et al., "Model cards for model reporting" (FAT* 2019), where they apply.
+# The headings follow Mitchell et al., "Model cards for model reporting", FAT* 2019.
 _LIMITS = (
-    "Trained on apartments and recordings made by this project alone: of real rooms, microphones "
-    "and cameras nothing is known. Figures of validation apartments are those by which checkpoints "
-    "and settings were chosen."
+    "Trained only on apartments and sounds of this project; the performance with real rooms, "
+    "microphones and cameras is unknown. Checkpoints and settings were selected by the metrics of "
+    "the validation apartments."
 )
 
 
@@ -24,7 +24,7 @@ def write_card(
     title: str,
     data: Mapping[str, str],
     recipe: Mapping[str, Any],
-    figures: Mapping[str, Any],
+    metrics: Mapping[str, Any],
 ) -> None:
     """Write `model_card.md` into a network's folder.
 
@@ -32,20 +32,20 @@ def write_card(
     ----------
     folder : Path
     title : str
-        What it is and does.
+        Description of the network.
     data : mapping of str to str
-        What it was trained and measured on, by a word for each.
+        Training and evaluation data: text by keyword.
     recipe : mapping
-        The config that it was built from.
-    figures : mapping
-        What was measured; numbers alone are shown.
+        Config of the network.
+    metrics : mapping
+        Metrics by name; entries that are not numbers are left out.
     """
     lines = [f"# {title}", "", "## Data", "", *(f"- {what}: {text}" for what, text in data.items())]
-    lines += ["", "## Figures", "", "| figure | value |", "| --- | --- |"]
-    numbers = {name: value for name, value in figures.items() if isinstance(value, int | float)}
+    lines += ["", "## Metrics", "", "| metric | value |", "| --- | --- |"]
+    numbers = {name: value for name, value in metrics.items() if isinstance(value, int | float)}
     lines += [f"| `{name}` | {numbers[name]:.4g} |" for name in sorted(numbers)]
     text = yaml.safe_dump(dict(recipe), sort_keys=True, allow_unicode=True)
-    lines += ["", "## Recipe", "", "```yaml", text.rstrip(), "```"]
+    lines += ["", "## Configuration", "", "```yaml", text.rstrip(), "```"]
     lines += ["", "## Limits", "", _LIMITS, "", "## Licence", "", "Apache-2.0, as the code.", ""]
     with atomic_write(folder / CARD) as part:
         part.write_text("\n".join(lines), encoding="utf-8")

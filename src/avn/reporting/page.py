@@ -1,4 +1,4 @@
-"""The report page: tables, episodes and their media put into one HTML file."""
+"""Report page: results, episodes and their media in one HTML file."""
 
 from __future__ import annotations
 
@@ -23,23 +23,24 @@ _ENDS = ("low", "high")
 
 @dataclass(frozen=True)
 class PageRun:
-    """A run as the page shows it.
+    """Run on the report page.
 
     Attributes
     ----------
     name, folder, settings : str
-        What it is called, where it lies, how it was set, in words.
+        Label, location and settings in words.
     privileged : bool
+        True if the agent uses ground truth that is not observable.
     results, episodes : DataFrame
         `results.csv` and `episodes.csv`.
     media : dict of int to int
-        By row of `episodes.csv`, the number of its embedded episode.
-    ways : list of dict, optional
-        Of each episode the number of its `plan` and the `states` of its way.
+        Index of the embedded episode by row of `episodes.csv`.
+    paths : list of dict, optional
+        Index of the `plan` and `states` of the path of each episode.
     seeds : DataFrame, optional
-        Of several runs that differ in their seed alone: `results.across_seeds` of them.
+        For a group of runs that differ only in their seed: its `results.across_seeds`.
     within : bool
-        Whether it is one of such runs.
+        True if the run is a member of such a group.
     """
 
     name: str
@@ -49,7 +50,7 @@ class PageRun:
     results: pd.DataFrame
     episodes: pd.DataFrame
     media: dict[int, int]
-    ways: list[dict[str, Any]] | None = None
+    paths: list[dict[str, Any]] | None = None
     seeds: pd.DataFrame | None = None
     within: bool = False
 
@@ -61,14 +62,19 @@ def render(
     views: Sequence[str],
     episodes: Sequence[dict[str, Any]],
 ) -> str:
-    """The page as HTML, which asks for nothing from anywhere.
+    """Render the page as self-contained HTML.
 
     Parameters
     ----------
     title : str
     runs : sequence of PageRun
-    plans, views, episodes : sequences
-        What the embedded episodes point at by number; see `avn.reporting.page_media`.
+    plans : sequence of dict
+        Floor plans; see `page_media.plan_of_place`.
+    views : sequence of str
+        Data URLs of views; see `page_media.view_url`.
+    episodes : sequence of dict
+        Embedded episodes, which refer to plans and views by index; see
+        `page_media.episode_media`.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(_TEMPLATES),
@@ -76,9 +82,9 @@ def render(
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
     )
-    named = dict.fromkeys(room for run in runs for room in run.results["scene"])
-    rooms = [*(room for room in named if room != AVERAGE), AVERAGE]
-    rows = [row for index, run in enumerate(runs) for row in _rows(index, run, rooms)]
+    named = dict.fromkeys(scene for run in runs for scene in run.results["scene"])
+    scenes = [*(scene for scene in named if scene != AVERAGE), AVERAGE]
+    rows = [row for index, run in enumerate(runs) for row in _rows(index, run, scenes)]
     data = {
         "average": AVERAGE,
         "all": ALL_SOUNDS,
@@ -88,7 +94,7 @@ def render(
                 "name": run.name,
                 "colour": _colour(index),
                 "episodes": _episodes(run),
-                "ways": run.ways is not None,
+                "paths": run.paths is not None,
             }
             for index, run in enumerate(runs)
         ],
@@ -97,18 +103,18 @@ def render(
         title=title,
         paper=PAPER,
         has_paper=any(cell and cell["paper"] for row in rows for cell in row["cells"]),
-        rooms=rooms,
+        scenes=scenes,
         rows=rows,
         runs=runs,
         data=data,
         views=list(views),
         episodes=list(episodes),
         breakdown=_breakdown(runs),
-        any_ways=any(run.ways for run in runs),
+        any_paths=any(run.paths for run in runs),
         base=next(run.name for run in runs if not run.within),
         differences=_differences(runs),
         licence="sortable-tablesort by Jonas Earendel, public domain (Unlicense)",
-        # our own files, which must not be escaped within their elements
+        # trusted files of the package, which must not be escaped
         **{
             name: jinja2.utils.markupsafe.Markup(_text(file))
             for name, file in (
@@ -128,24 +134,24 @@ def _colour(index: int) -> str:
     return RUN_COLOURS[index % len(RUN_COLOURS)]
 
 
-def _rows(index: int, run: PageRun, rooms: Sequence[str]) -> list[dict[str, Any]]:
-    """The table's rows of a run, one for each sound."""
+def _rows(index: int, run: PageRun, scenes: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the rows of a run in the table of results, one per sound."""
     paper = _paper()
     rows = []
     for sound, part in run.results.groupby("sound", sort=False):
         own = {str(row["scene"]): row for row in part.to_dict("records")}
         cells: list[dict[str, Any] | None] = []
-        for room in rooms:
-            if room not in own:
+        for scene in scenes:
+            if scene not in own:
                 cells.append(None)
                 continue
-            found, key = own[room], (str(own[room]["agent"]), str(own[room]["protocol"]))
-            cell: dict[str, Any] = {"scene": room, "paper": paper.get((*key, str(sound), room))}
-            for figure in ("sr", "spl"):
-                cell[figure] = round(100 * found[figure], 2)
+            found, key = own[scene], (str(own[scene]["agent"]), str(own[scene]["protocol"]))
+            cell: dict[str, Any] = {"scene": scene, "paper": paper.get((*key, str(sound), scene))}
+            for metric in ("sr", "spl"):
+                cell[metric] = round(100 * found[metric], 2)
                 for end in _ENDS:
-                    cell[f"{figure}_{end}"] = 100 * found[f"{figure}_{end}"]
-            cell["spread"] = _spread(run, str(sound), room)
+                    cell[f"{metric}_{end}"] = 100 * found[f"{metric}_{end}"]
+            cell["spread"] = _spread(run, str(sound), scene)
             cells.append(cell)
         rows.append(
             {
@@ -160,22 +166,22 @@ def _rows(index: int, run: PageRun, rooms: Sequence[str]) -> list[dict[str, Any]
     return rows
 
 
-def _spread(run: PageRun, sound: str, room: str) -> tuple[float, float] | None:
-    """Standard deviation of success rate and SPL over the seeds, in points."""
+def _spread(run: PageRun, sound: str, scene: str) -> tuple[float, float] | None:
+    """Return the standard deviation of success rate and SPL over seeds in percentage points."""
     if run.seeds is None:
         return None
-    chosen = (run.seeds["sound"] == sound) & (run.seeds["scene"] == room)
+    chosen = (run.seeds["sound"] == sound) & (run.seeds["scene"] == scene)
     row = run.seeds[chosen].iloc[0]
     return 100 * float(row["sr_std"]), 100 * float(row["spl_std"])
 
 
 def _differences(runs: Sequence[PageRun]) -> list[dict[str, Any]]:
-    """How much better each run is than the first, where both walked the same episodes."""
+    """Compute paired differences of each run to the first, if both have the same episodes."""
     rows = []
     first, *others = (run for run in runs if not run.within)
     for run in others:
         try:
-            table = compare(run.episodes, first.episodes).set_index("figure")
+            table = compare(run.episodes, first.episodes).set_index("metric")
         except UserError:
             continue
         points = 100 * table.loc[["sr", "spl"], ["difference", "low", "high"]].to_numpy()
@@ -184,14 +190,14 @@ def _differences(runs: Sequence[PageRun]) -> list[dict[str, Any]]:
 
 
 def _breakdown(runs: Sequence[PageRun]) -> str:
-    """The figure of results by difficulty, in the colours of the runs."""
+    """Draw the results by difficulty as a data URL, in the colours of the runs."""
     own = {run.name: index for index, run in enumerate(runs) if not run.within}
     episodes = {name: runs[index].episodes for name, index in own.items()}
     return figure_url(breakdown_figure(episodes, [_colour(index) for index in own.values()]))
 
 
 def _paper() -> dict[tuple[str, ...], tuple[float, float]]:
-    """The paper's success rate and SPL by agent, protocol, sound and room."""
+    """Return the paper's success rate and SPL in % by agent, protocol, sound and scene."""
     table = paper_table()
     means = table.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
     table = pd.concat([table, means.assign(sound=ALL_SOUNDS)])
@@ -202,7 +208,7 @@ def _paper() -> dict[tuple[str, ...], tuple[float, float]]:
 
 
 def _episodes(run: PageRun) -> list[list[Any]]:
-    """A run's episodes as the script lists them."""
+    """Return a run's episodes as rows for `report.js`."""
     return [
         [
             str(row["scene"]),

@@ -1,4 +1,4 @@
-"""What a page embeds of episodes: floor plans, paths, views, beliefs and sound, as text."""
+"""Episode media of the report page: plans, paths, views, beliefs and sound as JSON."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from avn.navigation.place import Place
 from avn.navigation.trace import Trace
 from avn.reporting.trajectory_figures import draw_apartment, outcome, title_of
 
-# Metres round the outermost cells that the picture of a plan shows.
+# Margin around the outermost cells in the image of a plan, metres.
 _ROUND = 1.0
 _PIXELS_A_METRE = 60
 _JPEG_QUALITY = 72
 
 
 def data_url(kind: str, content: bytes) -> str:
-    """A file as an address that holds it, such as `data:image/png;base64,...`."""
+    """Encode a file as a data URL, such as `data:image/png;base64,...`."""
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
 def figure_url(figure: Figure) -> str:
-    """A figure as a PNG of few colours."""
+    """Encode a figure as the data URL of a PNG with a palette of 128 colours."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     with Image.open(buffer) as image:
@@ -41,7 +41,7 @@ def figure_url(figure: Figure) -> str:
 
 
 def plan_of_place(place: Place) -> dict[str, Any]:
-    """The picture of an apartment from above, where it lies and its cells, all in metres."""
+    """Return the floor plan image of an apartment, its bounds and its cell centres in metres."""
     low, high = place.grid.centres.min(axis=0) - _ROUND, place.grid.centres.max(axis=0) + _ROUND
     width, height = (high - low).tolist()
     figure = Figure(figsize=(width, height), dpi=_PIXELS_A_METRE)
@@ -54,14 +54,14 @@ def plan_of_place(place: Place) -> dict[str, Any]:
 
 
 def view_url(view: NDArray[np.uint8]) -> str:
-    """A view (H, W, 3) as a JPEG."""
+    """Encode a view (H, W, 3) as the data URL of a JPEG."""
     buffer = io.BytesIO()
     Image.fromarray(view).save(buffer, "JPEG", quality=_JPEG_QUALITY)
     return data_url("image/jpeg", buffer.getvalue())
 
 
 def sound_url(track: NDArray[np.float32], rate: int) -> str:
-    """A track (n, 2) of a sampling rate in Hz as Ogg Vorbis."""
+    """Encode a stereo track (n, 2), at a rate in Hz, as the data URL of an Ogg Vorbis file."""
     buffer = io.BytesIO()
     with soundfile.SoundFile(buffer, "w", rate, 2, format="OGG", subtype="VORBIS") as file:
         for start in range(0, len(track), rate):  # libsndfile crashes on minutes at once
@@ -70,7 +70,17 @@ def sound_url(track: NDArray[np.float32], rate: int) -> str:
 
 
 def episode_media(trace: Trace, track: NDArray[np.float32], rate: int) -> dict[str, Any]:
-    """What a page shows of an episode step by step, beside its views."""
+    """Return the data of an episode by step, without its views, as JSON values.
+
+    Parameters
+    ----------
+    trace : Trace
+        The episode.
+    track : (n, 2) float32
+        Its soundtrack, left and right.
+    rate : int
+        Sampling rate of the soundtrack in Hz.
+    """
     heading = (trace.state % HEADINGS)[:, None]
     return {
         "title": title_of(trace),
@@ -79,7 +89,9 @@ def episode_media(trace: Trace, track: NDArray[np.float32], rate: int) -> dict[s
         "path": _rounded(np.concatenate((trace.path, heading), axis=1)),
         "action": trace.action.tolist(),
         "collided": trace.collided.astype(int).tolist(),
-        "heard": None if trace.heard is None else _rounded(trace.heard),
+        "source_estimates": None
+        if trace.source_estimates is None
+        else _rounded(trace.source_estimates),
         "belief": _belief(trace),
         "memory": _memory(trace),
         "sound": sound_url(track, rate),
@@ -87,27 +99,27 @@ def episode_media(trace: Trace, track: NDArray[np.float32], rate: int) -> dict[s
 
 
 def _belief(trace: Trace) -> dict[str, Any] | None:
-    thoughts = trace.thoughts
-    if thoughts is None or thoughts.free is None or not len(trace.action):
+    beliefs = trace.beliefs
+    if beliefs is None or beliefs.free is None or not len(trace.action):
         return None
-    height, width = thoughts.free.shape[1:]
-    left, bottom = (thoughts.low - 0.5) * CELL
+    height, width = beliefs.free.shape[1:]
+    left, bottom = (beliefs.low - 0.5) * CELL
     return {
         "left": float(left),
         "top": float(bottom + CELL * height),
         "width": width,
         "height": height,
-        "free": base64.b64encode(thoughts.free.tobytes()).decode("ascii"),
+        "free": base64.b64encode(beliefs.free.tobytes()).decode("ascii"),
     }
 
 
 def _memory(trace: Trace) -> dict[str, Any] | None:
-    """The walk that an agent remembers, and the places that its memory returned."""
-    thoughts = trace.thoughts
-    if thoughts is None or thoughts.retrieved is None or trace.walk is None:
+    """Return the exploration walk in an agent's memory and the retrieved positions."""
+    beliefs = trace.beliefs
+    if beliefs is None or beliefs.retrieved is None or trace.walk is None:
         return None
     walk = trace.place.grid.centres[trace.walk // HEADINGS]
-    return {"walk": _rounded(walk), "entries": _rounded(thoughts.retrieved[..., :2])}
+    return {"walk": _rounded(walk), "entries": _rounded(beliefs.retrieved[..., :2])}
 
 
 def _rounded(values: NDArray[np.float64]) -> list[Any]:

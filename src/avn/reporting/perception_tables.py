@@ -1,4 +1,4 @@
-"""Tables of how well networks hear, see and recognise, beside a run's results."""
+"""Tables of perception errors of a run: source estimates, local patches, localisation."""
 
 from __future__ import annotations
 
@@ -8,18 +8,20 @@ import pandas as pd
 from rich.table import Table
 
 
-def heard_table(heard: pd.DataFrame) -> Table:
-    """What a sound network hears, by sound and sight: means over the rooms of the room medians.
+def source_estimates_table(source_estimates: pd.DataFrame) -> Table:
+    """Tabulate the errors of source estimates by sound and line of sight.
+
+    Values are means over scenes of the medians of each scene.
 
     Parameters
     ----------
-    heard : DataFrame
-        As `avn.pipeline.audio_inference.sound_errors` gives it, of any number of rooms.
+    source_estimates : DataFrame
+        Errors of any number of scenes; see `avn.pipeline.audio_inference.sound_errors`.
     """
-    columns = ("metres off", "degrees off", "over 90 degrees off")
-    table = _table("what is heard, medians of the rooms", columns)
-    figures = ["error_m", "bearing_deg", "front_back"]
-    means = heard.groupby(["sound", "sight"], as_index=False, sort=False)[figures].mean()
+    columns = ("error, m", "bearing error, degrees", "bearing error > 90 degrees")
+    table = _table("source estimates: mean over scenes of the median error", columns)
+    metrics = ["error_m", "bearing_deg", "front_back"]
+    means = source_estimates.groupby(["sound", "sight"], as_index=False, sort=False)[metrics].mean()
     for row in means.to_dict("records"):
         label = f"{row['sound']}, {row['sight'].replace('_', ' ')}"
         metres, degrees = f"{row['error_m']:.2f}", f"{row['bearing_deg']:.0f}"
@@ -27,16 +29,16 @@ def heard_table(heard: pd.DataFrame) -> Table:
     return table
 
 
-def windows_table(seen: pd.DataFrame) -> Table:
-    """How well free cells are seen, over the views of all rooms, beside the prior.
+def local_patches_table(seen: pd.DataFrame) -> Table:
+    """Tabulate the accuracy of predicted local occupancy patches, beside that of the prior.
 
     Parameters
     ----------
     seen : DataFrame
-        As `avn.pipeline.occupancy.window_errors` gives it.
+        Errors over the views of all scenes; see `avn.pipeline.occupancy.window_errors`.
     """
     columns = ("ROC AUC", "accuracy", "calibration error")
-    table = _table("which cells look free", columns)
+    table = _table("local patches: prediction of free cells", columns)
     for row in seen[seen["scene"] == "all"].to_dict("records"):
         label = f"{row['by']}, {row['cells']} cells"
         table.add_row(
@@ -45,18 +47,18 @@ def windows_table(seen: pd.DataFrame) -> Table:
     return table
 
 
-def places_table(places: pd.DataFrame) -> Table:
-    """How far the places that memories return are off: means over the rooms.
+def localisation_table(places: pd.DataFrame) -> Table:
+    """Tabulate the errors of visual localisation by memory retrieval, as means over scenes.
 
     Parameters
     ----------
     places : DataFrame
-        As `avn.mapping.place_errors.place_errors` gives it, of any number of rooms.
+        Errors of any number of scenes; see `avn.mapping.place_errors.place_errors`.
     """
-    columns = ("metres off, median", "mean", "heading right")
-    table = _table("where views are recognised, means of the rooms", columns)
-    figures = ["error_m", "error_mean_m", "heading"]
-    means = places.groupby("cells", as_index=False, sort=False)[figures].mean()
+    columns = ("median error, m", "mean error, m", "heading correct")
+    table = _table("localisation by memory retrieval: means over scenes", columns)
+    metrics = ["error_m", "error_mean_m", "heading"]
+    means = places.groupby("cells", as_index=False, sort=False)[metrics].mean()
     for row in means.to_dict("records"):
         median, mean = f"{row['error_m']:.2f}", f"{row['error_mean_m']:.2f}"
         table.add_row(f"{row['cells']} cells", median, mean, f"{100 * row['heading']:.0f} %")

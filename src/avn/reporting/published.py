@@ -1,4 +1,4 @@
-"""The whole table as the paper lays it out, for a terminal, Markdown and LaTeX."""
+"""Table of all results in the layout of the paper, for a terminal, Markdown and LaTeX."""
 
 from __future__ import annotations
 
@@ -13,33 +13,34 @@ from rich.text import Text
 from avn.reporting.results import ALL_SOUNDS, AVERAGE, LABELS, across_seeds, summarise
 from avn.reporting.table import PAPER, PAPER_PROTOCOL, paper_table, readable
 
-# One seed for all, so that the episodes of several seeds are one run with one interval.
+# Common seed, with which the episodes of several seeds are pooled into one run.
 _POOLED = -1
-# What stands in a cell.
+# Lines of a cell.
 OWN, INTERVAL, SPREAD = "own", "95 %", "± over seeds"
 ENDS = ("low", "high")
 
 
 def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
-    """One line for each agent, setting, sound and room.
+    """Combine the results of all runs into one row per agent, setting, sound and scene.
 
     Parameters
     ----------
     runs : DataFrame
-        Results of all runs, as `avn.reporting.results.summarise` gives them.
+        Results of all runs; see `avn.reporting.results.summarise`.
     episodes : DataFrame
-        Their episodes.
+        Episodes of all runs.
 
     Returns
     -------
     DataFrame
-        `LABELS`, sound, room; sr and spl in %, means over the runs; `sr_low` to `spl_high`, 95 %
-        intervals over (room, source) clusters of all their episodes together; `sr_std` and
-        `spl_std`, the spread over seeds; `paper_sr` and `paper_spl`, NaN where the paper has none.
+        `LABELS`, `sound`, `scene`; `sr` and `spl`, means over runs in %; `sr_low` to `spl_high`,
+        95 % confidence intervals over (scene, source) clusters of the pooled episodes; `sr_std`
+        and `spl_std`, standard deviations over seeds; `paper_sr` and `paper_spl`, NaN if the
+        paper has no such row.
     """
     keys = [*LABELS, "sound", "scene"]
     intervals = summarise(episodes.assign(seed=_POOLED))
-    ends = [f"{figure}_{end}" for figure in ("sr", "spl") for end in ENDS]
+    ends = [f"{metric}_{end}" for metric in ("sr", "spl") for end in ENDS]
     spread = across_seeds(runs)[[*keys, "sr", "spl", "sr_std", "spl_std"]]
     found = spread.merge(intervals[[*keys, *ends]], on=keys, how="left", sort=False)
     percent = ["sr", "spl", "sr_std", "spl_std", *ends]
@@ -52,27 +53,27 @@ def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def paper_averages() -> dict[str, str]:
-    """The paper's success rate and SPL of each row, over all sounds and rooms."""
+    """Return the paper's success rate and SPL of each agent over all sounds and scenes."""
     paper = paper_table()
     average = paper[paper["scene"] == AVERAGE].groupby("agent")[["sr", "spl"]].mean()
     return {
-        str(row): _pair(*figures)
-        for row, figures in zip(average.index, average.to_numpy(), strict=True)
+        str(row): _pair(*metrics)
+        for row, metrics in zip(average.index, average.to_numpy(), strict=True)
     }
 
 
 def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
-    """The table for a terminal; agents named in `privileged` are marked as bounds."""
-    rooms = list(dict.fromkeys(cells["scene"]))
+    """Lay the table out for a terminal; agents in `privileged` are marked as upper bounds."""
+    scenes = list(dict.fromkeys(cells["scene"]))
     title = f"success rate / SPL, % ({_settings(cells)})"
     table = Table(title=title, box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
-    for room in rooms:
-        table.add_column(readable(room), justify="right", no_wrap=True)
+    for scene in scenes:
+        table.add_column(readable(scene), justify="right", no_wrap=True)
     for agent, own in cells.groupby("agent", sort=False):
         table.add_row(Text(f"{agent}{_mark(str(agent), privileged)}", style="bold"))
         for sound, part in own.groupby("sound", sort=False):
-            lines = pd.DataFrame(map(_lines, _in_rooms(part, rooms)))
+            lines = pd.DataFrame(map(_lines, _in_scenes(part, scenes)))
             table.add_row(Text(f"  {sound}"), *lines[OWN])
             for name in (INTERVAL, SPREAD, PAPER):
                 if lines[name].any():
@@ -81,18 +82,28 @@ def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
 
 
 def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str] = ()) -> str:
-    """A table for each sound: agents down, rooms across, what belongs to a cell under it."""
+    """Format the table as Markdown, one table per sound with rows of agents.
+
+    Parameters
+    ----------
+    cells : DataFrame
+        As `published` returns it.
+    sounds : sequence of str
+        Names of the sounds, in order.
+    privileged : collection of str
+        Agents that are marked as upper bounds.
+    """
     text = [
         f"Success rate / SPL in % ({_settings(cells)}). Below each pair: the 95 % interval, the "
         "standard deviation over seeds and, in parentheses, the results of the paper.",
         "",
     ]
     for sound, part in _by_sound(cells, sounds):
-        rooms = list(dict.fromkeys(part["scene"]))
-        text += [f"### {sound}", "", f"| | {' | '.join(_cell_safe(readable(r)) for r in rooms)} |"]
-        text.append("| --- " * (1 + len(rooms)) + "|")
+        scenes = list(dict.fromkeys(part["scene"]))
+        text += [f"### {sound}", "", f"| | {' | '.join(_cell_safe(readable(r)) for r in scenes)} |"]
+        text.append("| --- " * (1 + len(scenes)) + "|")
         for agent, own in part.groupby("agent", sort=False):
-            found = [_stacked(_lines(row), "<br>") for row in _in_rooms(own, rooms)]
+            found = [_stacked(_lines(row), "<br>") for row in _in_scenes(own, scenes)]
             name = _cell_safe(f"`{agent}`{_mark(str(agent), privileged)}")
             text.append(f"| {name} | {' | '.join(found)} |")
         text.append("")
@@ -100,16 +111,26 @@ def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[
 
 
 def latex(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str] = ()) -> str:
-    """The same as one `tabular` with a `\\shortstack` in each cell."""
-    rooms = list(dict.fromkeys(cells["scene"]))
+    """Format the table as one LaTeX `tabular`, with a `shortstack` per cell.
+
+    Parameters
+    ----------
+    cells : DataFrame
+        As `published` returns it.
+    sounds : sequence of str
+        Names of the sounds, in order.
+    privileged : collection of str
+        Agents that are marked as upper bounds.
+    """
+    scenes = list(dict.fromkeys(cells["scene"]))
     text = [f"% success rate / SPL in %: {_settings(cells)}"]
-    text += ["\\begin{tabular}{ll" + "c" * len(rooms) + "}", "\\hline"]
-    heads = ["Sound", "Agent", *(_escaped(readable(room)) for room in rooms)]
+    text += ["\\begin{tabular}{ll" + "c" * len(scenes) + "}", "\\hline"]
+    heads = ["Sound", "Agent", *(_escaped(readable(scene)) for scene in scenes)]
     text.append(" & ".join(heads) + " \\\\ \\hline")
     for sound, part in _by_sound(cells, sounds):
         for agent, own in part.groupby("agent", sort=False):
-            # braces keep LaTeX from reading the bracket of an interval as a length
-            stacks = [_stacked(_lines(row), " \\\\{} ") for row in _in_rooms(own, rooms)]
+            # braces, or LaTeX reads the bracket of an interval as a length
+            stacks = [_stacked(_lines(row), " \\\\{} ") for row in _in_scenes(own, scenes)]
             found = ["\\shortstack{" + stack.replace("±", "$\\pm$") + "}" for stack in stacks]
             name = _escaped(f"{agent}{_mark(str(agent), privileged)}")
             text.append(" & ".join([_escaped(sound), name, *found]) + " \\\\")
@@ -118,15 +139,15 @@ def latex(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str
 
 
 def _settings(cells: pd.DataFrame) -> str:
-    """Protocol, acoustics and ways of looking of a table."""
+    """Describe the protocol, acoustics and `look` settings of a table."""
     return ", ".join(
         f"{key}={' and '.join(dict.fromkeys(map(str, cells[key])))}" for key in LABELS[1:]
     )
 
 
 def _mark(agent: str, privileged: Collection[str]) -> str:
-    """What stands behind the name of an agent that is no entry but a bound."""
-    return " (a bound)" if agent in privileged else ""
+    """Return the suffix of a privileged agent's name."""
+    return " (upper bound)" if agent in privileged else ""
 
 
 def _cell_safe(text: str) -> str:
@@ -134,18 +155,18 @@ def _cell_safe(text: str) -> str:
 
 
 def _by_sound(cells: pd.DataFrame, sounds: Sequence[str]) -> list[tuple[str, pd.DataFrame]]:
-    """The parts of a table, those of all sounds together last."""
+    """Split a table by sound; all sounds pooled come last."""
     named = [*sounds, *([ALL_SOUNDS] if len(sounds) > 1 else [])]
     return [(sound, cells[cells["sound"] == sound]) for sound in named]
 
 
-def _in_rooms(part: pd.DataFrame, rooms: list[str]) -> list[dict[Hashable, Any]]:
-    """The cells of one agent and sound, in the order of the rooms."""
-    return part.set_index("scene").reindex(rooms).to_dict("records")
+def _in_scenes(part: pd.DataFrame, scenes: list[str]) -> list[dict[Hashable, Any]]:
+    """Return the cells of one agent and sound in the order of the scenes."""
+    return part.set_index("scene").reindex(scenes).to_dict("records")
 
 
 def _lines(row: dict[Hashable, Any]) -> dict[str, str]:
-    """What stands in one cell, line by line; empty where there is nothing to say."""
+    """Format the lines of one cell; those without data are empty."""
     low, high = ([f"{row[f'{name}_{end}']:.0f}" for name in ("sr", "spl")] for end in ENDS)
     ends = [one if one == other else f"{one}-{other}" for one, other in zip(low, high, strict=True)]
     return {

@@ -1,4 +1,4 @@
-"""Records of episodes, their figures by room and sound, and the files that hold both."""
+"""Records of episodes, metrics by scene and sound, and their CSV files."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ EPISODE_COLUMNS = (
     *("actions", "fewest_actions", "collisions", "outcome"),
     *("success", "spl", "softspl", "sna", "dtg"),
 )
-# The figures of results.csv, and the column of episodes.csv that each is the mean of. Shares are
-# between 0 and 1; dtg is in metres.
-FIGURES = {"sr": "success", "spl": "spl", "softspl": "softspl", "sna": "sna", "dtg": "dtg"}
-INTERVALS = tuple(f"{figure}_{end}" for figure in FIGURES for end in ("low", "high"))
-RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *FIGURES, *INTERVALS)
+# Metrics of results.csv, and the column of episodes.csv that each is the mean of. Rates are from 0
+# to 1; dtg is in metres.
+METRICS = {"sr": "success", "spl": "spl", "softspl": "softspl", "sna": "sna", "dtg": "dtg"}
+INTERVALS = tuple(f"{metric}_{end}" for metric in METRICS for end in ("low", "high"))
+RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *METRICS, *INTERVALS)
 ALL_SOUNDS = "all"
 AVERAGE = "average"
 _PAIR = ["sound", "scene", "seed", "episode"]
 
 
 def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
-    """Figures by room and sound, with intervals.
+    """Compute the metrics by scene and sound, with confidence intervals.
 
     Parameters
     ----------
     episodes : DataFrame
-        Records as `avn.agents.rollout.rollout_scene` makes them; any number of agents, protocols,
-        sounds, rooms and seeds.
+        Records of any number of agents, protocols, sounds, scenes and seeds; see
+        `avn.agents.rollout.rollout_scene`.
     draws : int
-        Resamples of the bootstrap.
+        Bootstrap resamples.
 
     Returns
     -------
     DataFrame
-        Columns `RESULT_COLUMNS`. Room `average` is the mean over the rooms, each counting the
-        same, as in the paper; sound `all`, where there is more than one, takes the episodes of
-        all sounds together. Intervals are 95 % bootstrap intervals over (room, source) clusters.
+        Columns `RESULT_COLUMNS`. Scene `average` is the unweighted mean over scenes, as in the
+        paper. Sound `all` pools the episodes of all sounds if there are several. Intervals are
+        95 % bootstrap intervals over (scene, source) clusters.
 
     Raises
     ------
     UserError
-        Where there is no episode.
+        If there is no episode.
     """
     if not len(episodes):
         raise UserError("split: no episode was walked; choose a split with a test apartment")
@@ -61,25 +61,25 @@ def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
         if len(sounds) > 1:
             sounds.append((ALL_SOUNDS, run))
         for sound, part in sounds:
-            rooms = [(str(room), own) for room, own in part.groupby("scene", sort=False)]
-            for room, own in [*rooms, (AVERAGE, part)]:
-                row = {**labels, "sound": sound, "scene": room, "episodes": len(own)}
-                rows.append(row | _figures(own, draws))
+            scenes = [(str(scene), own) for scene, own in part.groupby("scene", sort=False)]
+            for scene, own in [*scenes, (AVERAGE, part)]:
+                row = {**labels, "sound": sound, "scene": scene, "episodes": len(own)}
+                rows.append(row | _metrics(own, draws))
     return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
 
 
-def _figures(episodes: pd.DataFrame, draws: int) -> dict[str, float]:
-    values = episodes[list(FIGURES.values())].to_numpy(dtype=np.float64)
-    weights = _room_weights(episodes)
+def _metrics(episodes: pd.DataFrame, draws: int) -> dict[str, float]:
+    values = episodes[list(METRICS.values())].to_numpy(dtype=np.float64)
+    weights = _scene_weights(episodes)
     means = weights @ values
     low, high = cluster_bootstrap(values, _clusters(episodes), weights, draws)
-    figures = dict(zip(FIGURES, means.tolist(), strict=True))
+    metrics = dict(zip(METRICS, means.tolist(), strict=True))
     ends = np.stack((low, high), axis=1).reshape(-1)
-    return figures | dict(zip(INTERVALS, ends.tolist(), strict=True))
+    return metrics | dict(zip(INTERVALS, ends.tolist(), strict=True))
 
 
-def _room_weights(episodes: pd.DataFrame) -> np.ndarray:
-    """Weights that sum to 1 and give every room the same share, however many episodes it has."""
+def _scene_weights(episodes: pd.DataFrame) -> np.ndarray:
+    """Compute weights of the episodes that sum to 1 and are equal in total for all scenes."""
     sizes = episodes.groupby("scene")["scene"].transform("size").to_numpy(dtype=np.float64)
     return 1.0 / (sizes * episodes["scene"].nunique())
 
@@ -89,56 +89,59 @@ def _clusters(episodes: pd.DataFrame) -> np.ndarray:
 
 
 def headline(results: pd.DataFrame) -> dict[str, float]:
-    """The figures over all rooms and sounds of one run, such as for TensorBoard's hparams.
+    """Return the metrics of one run over all scenes and sounds.
 
     Raises
     ------
     ValueError
-        Where the results hold more than one agent, protocol or seed.
+        If the results are of more than one agent, protocol or seed.
     """
     average = results[results["scene"] == AVERAGE]
     if len(average) > 1:
         average = average[average["sound"] == ALL_SOUNDS]
     if len(average) != 1:
         raise ValueError(f"results of one run have one average, these have {len(average)}")
-    return {figure: float(average.iloc[0][figure]) for figure in FIGURES}
+    return {metric: float(average.iloc[0][metric]) for metric in METRICS}
 
 
 def across_seeds(results: pd.DataFrame) -> pd.DataFrame:
-    """Mean and spread over the seeds of a sweep.
+    """Compute mean and standard deviation of the metrics over seeds.
 
     Returns
     -------
     DataFrame
-        One row by agent, protocol, acoustics, look, sound and room: `seeds`, how many, and for
-        each figure its mean and `<figure>_std`, the sample standard deviation (NaN for one seed).
+        One row per agent, protocol, acoustics, look, sound and scene: `seeds`, their number, and
+        for each metric its mean and `<metric>_std`, the sample standard deviation (NaN for one
+        seed).
     """
     groups = results.groupby([*LABELS, "sound", "scene"], sort=False)
     table = groups["seed"].nunique().rename("seeds").to_frame()
-    for figure in FIGURES:
-        table[figure] = groups[figure].mean()
-        table[f"{figure}_std"] = groups[figure].std(ddof=1)
+    for metric in METRICS:
+        table[metric] = groups[metric].mean()
+        table[f"{metric}_std"] = groups[metric].std(ddof=1)
     return table.reset_index()
 
 
 def compare(one: pd.DataFrame, other: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
-    """Paired differences between two runs over the same episodes, `one` less `other`.
+    """Compute paired differences between two runs over the same episodes, `one` minus `other`.
 
     Parameters
     ----------
     one, other : DataFrame
         Records of one run each.
+    draws : int
+        Bootstrap resamples over (scene, source) clusters.
 
     Returns
     -------
     DataFrame
-        By figure: `difference`, `low`, `high`; rooms count the same, and intervals are bootstrapped
-        over (room, source) clusters.
+        `metric`, `difference`, and its 95 % confidence interval `low`, `high`. Scenes have equal
+        weight.
 
     Raises
     ------
     UserError
-        Where the two did not walk the same episodes.
+        If the runs have different episodes.
     """
     same = [*_PAIR, "source", "start_cell", "start_heading"]
     first, second = (
@@ -149,22 +152,22 @@ def compare(one: pd.DataFrame, other: pd.DataFrame, draws: int = 2000) -> pd.Dat
             "episodes.csv: the two runs did not walk the same episodes; run both with the same "
             "split, protocol, sound and seed"
         )
-    columns = list(FIGURES.values())
+    columns = list(METRICS.values())
     values = (first[columns].to_numpy(np.float64)) - second[columns].to_numpy(np.float64)
-    weights = _room_weights(first)
+    weights = _scene_weights(first)
     low, high = cluster_bootstrap(values, _clusters(first), weights, draws)
     return pd.DataFrame(
-        {"figure": list(FIGURES), "difference": weights @ values, "low": low, "high": high}
+        {"metric": list(METRICS), "difference": weights @ values, "low": low, "high": high}
     )
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
-    """Write a table whole or not at all."""
+    """Write a table as CSV, atomically."""
     with atomic_write(path) as part:
         table.to_csv(part, index=False, lineterminator="\n")
 
 
 def read_csv(path: Path) -> pd.DataFrame:
-    """Read a table of this module back; names stay text, also a sound called 440 or nan."""
+    """Read a table of this module; names are kept as text, also a sound called 440 or nan."""
     names = dict.fromkeys((*LABELS, "sound", "scene", "outcome"), str)
     return pd.read_csv(path, dtype=names, keep_default_na=False, na_values=[""])

@@ -1,4 +1,4 @@
-"""What TensorBoard shows of a sound network: locations on a floor plan, spectrograms, audio."""
+"""TensorBoard figures of a sound network: locations on a floor plan, spectrograms, audio."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from torch import Tensor
 
 from avn.apartments.floor_plan import CELL, DOOR_WIDTH, WALL_THICKNESS, FloorPlan
 
-# Wherever a figure tells in sight from out of sight.
+# Colours of states with the source in sight (True) and out of sight (False).
 COLOURS = {True: "tab:blue", False: "tab:orange"}
 
 
@@ -45,7 +45,22 @@ def draw_plan(axes: Axes, plan: FloorPlan) -> None:
 def to_world(
     relative: NDArray[Any], places: NDArray[Any], headings: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """Locations (N, 2), metres right and front of agents at `places` (N, 2), as east and north."""
+    """Transform locations from the agents' frames to east and north.
+
+    Parameters
+    ----------
+    relative : (N, 2) array
+        Metres right and in front of the agent.
+    places : (N, 2) array
+        East and north of the agent in metres.
+    headings : (N,) integer array
+        0 north, 1 east, 2 south, 3 west.
+
+    Returns
+    -------
+    (N, 2) float64
+        East and north in metres.
+    """
     right, front = relative[:, 0], relative[:, 1]
     east = np.choose(headings, (right, front, -right, -front))
     north = np.choose(headings, (front, -right, -front, right))
@@ -60,7 +75,7 @@ def location_figure(
     in_sight: NDArray[np.bool_],
     title: str,
 ) -> Figure:
-    """Draw where the network hears one source from everywhere, against where it is.
+    """Draw the estimated locations of one source from all states, and the true one.
 
     Parameters
     ----------
@@ -68,18 +83,19 @@ def location_figure(
     lattice : (C, 2) integer array
         Cells in steps of the grid.
     estimate, target : (4 C, 2) arrays
-        Metres right and front, by state.
-    in_sight : (4 C) bool array
+        Metres right and in front of the agent, by state.
+    in_sight : (4 C,) bool array
+        True if the source is in sight of the state.
     title : str
 
     Returns
     -------
-    matplotlib Figure
-        A dot for each state where the source is heard, a star where it is.
+    Figure
+        A dot for the estimate of each state, a star at the source.
     """
     states = np.arange(len(estimate))
     places, headings = lattice[states // 4] * CELL, states % 4
-    heard = to_world(estimate, places, headings)
+    estimated = to_world(estimate, places, headings)
     source = to_world(target, places, headings)[0]
     error = np.linalg.norm(estimate - target, axis=1)
     figure = Figure(figsize=(7, 6), layout="constrained")
@@ -88,9 +104,9 @@ def location_figure(
     for seen, label in ((True, "in sight"), (False, "out of sight")):
         chosen = in_sight == seen
         if chosen.any():
-            text = f"heard {label}: median {np.median(error[chosen]):.1f} m off"
-            look: dict[str, Any] = {"alpha": 0.6, "color": COLOURS[seen], "zorder": 3}
-            axes.scatter(heard[chosen, 0], heard[chosen, 1], s=9, label=text, **look)
+            text = f"estimates {label}: median error {np.median(error[chosen]):.1f} m"
+            style: dict[str, Any] = {"alpha": 0.6, "color": COLOURS[seen], "zorder": 3}
+            axes.scatter(estimated[chosen, 0], estimated[chosen, 1], s=9, label=text, **style)
     axes.plot(*source, "*", markersize=16, color="red", mec="black", label="true", zorder=4)
     axes.set_title(title)
     axes.legend(loc="upper left", bbox_to_anchor=(0, -0.1), frameon=False)
@@ -98,7 +114,7 @@ def location_figure(
 
 
 def spectrogram_figure(pictures: Tensor, title: str) -> Figure:
-    """Draw the pictures (channels, bands, frames) that the network sees of one clip."""
+    """Draw the input channels (channels, bands, frames) of the network for one clip."""
     names = ("left", "right", "coherence, real", "coherence, imaginary")
     figure = Figure(figsize=(3.2 * len(pictures), 3.2), layout="constrained")
     for index, (picture, name) in enumerate(zip(pictures, names, strict=False)):
@@ -117,7 +133,7 @@ def spectrogram_figure(pictures: Tensor, title: str) -> Figure:
 
 
 def stereo(clip: Tensor, rate: int) -> Summary.Audio:
-    """A clip (2, n) as TensorBoard's audio with two channels, its peak brought to 0.9."""
+    """Encode a clip (2, n) as TensorBoard audio with two channels and a peak of 0.9."""
     scaled = clip * (0.9 * 32767 / clip.abs().max().clamp_min(1e-9))
     content = io.BytesIO()
     with wave.open(content, "wb") as file:
@@ -135,19 +151,19 @@ def stereo(clip: Tensor, rate: int) -> Summary.Audio:
 
 
 class SoundFigures(Callback):
-    """Writes the figures and the audio of the first validation apartment to TensorBoard.
+    """Callback that logs figures and audio of the first validation apartment to TensorBoard.
 
     Parameters
     ----------
     every : int
-        Epochs between two figures of locations; the last epoch has one too.
+        Epochs between figures of locations; the first and last epoch are always logged.
     """
 
     def __init__(self, every: int = 5) -> None:
         self.every = every
 
     def on_train_start(self, trainer: L.Trainer, pl_module: Any) -> None:
-        """Write spectrograms and audio of every sound, in sight and out of sight."""
+        """Log spectrograms and audio of every sound, in sight and out of sight."""
         if trainer.current_epoch or not isinstance(trainer.logger, TensorBoardLogger):
             return
         clips = trainer.datamodule.measured_clips["validation"]  # type: ignore[attr-defined]
@@ -167,7 +183,7 @@ class SoundFigures(Callback):
                 writer.file_writer.add_summary(Summary(value=[audio]), 0)
 
     def on_validation_epoch_end(self, trainer: L.Trainer, pl_module: Any) -> None:
-        """Write heard against true locations of the first source, a figure for each sound."""
+        """Log estimated and true locations of the first source, one figure per sound."""
         epoch = trainer.current_epoch + 1
         due = epoch % self.every == 0 or epoch in (1, trainer.max_epochs)
         if not due or not isinstance(trainer.logger, TensorBoardLogger):
@@ -180,11 +196,13 @@ class SoundFigures(Callback):
             items = clips.item(states, torch.tensor(index), 0)
             batches = [clips.__getitems__(part.tolist()) for part in items.split(128)]
             with torch.inference_mode():
-                heard = [pl_module(batch["clips"].to(pl_module.device)).cpu() for batch in batches]
+                estimates = [
+                    pl_module(batch["clips"].to(pl_module.device)).cpu() for batch in batches
+                ]
             figure = location_figure(
                 scene.plan,
                 scene.grid.lattice,
-                torch.cat(heard).numpy(),
+                torch.cat(estimates).numpy(),
                 torch.cat([batch["target"] for batch in batches]).numpy(),
                 torch.cat([batch["in_sight"] for batch in batches]).numpy(),
                 f"{scene.name}, {sound}, epoch {epoch}",

@@ -1,4 +1,4 @@
-"""The tables that people read: results by room and sound as the paper lays them out."""
+"""Terminal tables of results by scene and sound in the layout of the paper."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ PAPER_PROTOCOL = "var"
 
 
 def paper_table() -> pd.DataFrame:
-    """The paper's own table in long form: agent, sound, room, sr, spl, both in %.
+    """Read the results of the paper in long form: agent, sound, scene, sr, spl, both in %.
 
-    From Gan, Zhang, Wu, Gong and Tenenbaum, "Look, Listen, and Act: Towards Audio-Visual Embodied
-    Navigation", ICRA 2020, table I. Its rooms are other apartments than ours of the same size.
+    Gan, Zhang, Wu, Gong and Tenenbaum, "Look, Listen, and Act: Towards Audio-Visual Embodied
+    Navigation", ICRA 2020, table I. Its scenes are other apartments of the same size.
     """
     file = resources.files("avn") / "assets" / "paper_table.csv"
     with file.open(encoding="utf-8") as lines:
@@ -28,42 +28,42 @@ def paper_table() -> pd.DataFrame:
 
 
 def results_table(results: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
-    """Success rate / SPL in %, a row for each agent and sound and a column for each room.
+    """Tabulate success rate / SPL in %, with rows of agents and sounds and columns of scenes.
 
-    Under each row stands the paper's own where it has one, which is under its own protocol `var`
-    alone; its `all` is the mean over its sounds.
-    Figures of several seeds are averaged. Agents named in `privileged` are marked as such.
+    Results of several seeds are averaged. Rows of protocol `var` are followed by those of the
+    paper if it has them; its `all` is the mean over its sounds. Agents in `privileged` are marked
+    as upper bounds.
     """
-    rooms = list(dict.fromkeys(results["scene"]))
+    scenes = list(dict.fromkeys(results["scene"]))
     table = Table(title="success rate / SPL, %", box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
-    for room in rooms:
-        table.add_column(readable(room), justify="right", no_wrap=True)
+    for scene in scenes:
+        table.add_column(readable(scene), justify="right", no_wrap=True)
     paper = _paper_cells()
     columns = ["agent", "protocol", "acoustics", "look"]
     for keys, run in results.groupby(columns, sort=False):
         names = [str(key) for key in keys]
-        mark = " (privileged: a bound)" if names[0] in privileged else ""
+        mark = " (privileged: upper bound)" if names[0] in privileged else ""
         table.add_row(f"[bold]{' · '.join(names)}{mark}[/bold]")
         for sound, part in run.groupby("sound", sort=False):
             means = 100.0 * part.groupby("scene", sort=False)[["sr", "spl"]].mean()
-            cells = [_cell(*row) for row in means.reindex(rooms).to_numpy()]
+            cells = [_cell(*row) for row in means.reindex(scenes).to_numpy()]
             table.add_row(f"  {sound}", *cells)
-            own = [paper.get((*names[:2], str(sound), room), "") for room in rooms]
+            own = [paper.get((*names[:2], str(sound), scene), "") for scene in scenes]
             if any(own):
                 table.add_row(f"    {PAPER}", *own, style="dim")
     return table
 
 
 def hardness(episodes: pd.DataFrame) -> pd.DataFrame:
-    """How hard the starts are, by room and on average.
+    """Compute the difficulty of the starts by scene and on average.
 
     Returns
     -------
     DataFrame
-        `scene`; `episodes`; `other_room`, the share of starts in another room than the source;
-        `out_of_sight`, the share of starts that do not see it; `detour`, the mean ratio of
-        geodesic to Euclidean distance; `geodesic`, the mean in metres.
+        `scene`; `episodes`, their number; `other_room`, the share of starts in another room than
+        the source; `out_of_sight`, the share without line of sight to it; `detour`, the mean
+        ratio of geodesic to Euclidean distance; `geodesic`, the mean distance in metres.
     """
     described = pd.DataFrame(
         {
@@ -84,17 +84,17 @@ def hardness(episodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def hardness_table(episodes: pd.DataFrame) -> Table:
-    """`hardness` as a table for the terminal."""
-    table = Table(title="how hard the starts are", box=None, pad_edge=False, title_justify="left")
+    """Format `hardness` as a table for the terminal."""
+    table = Table(title="difficulty of the starts", box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
     for title in ("starts", "in another room", "out of sight", "geodesic / Euclidean", "geodesic"):
         table.add_column(title, justify="right", no_wrap=True)
     described = hardness(episodes).set_index("scene")
     shares = described[["other_room", "out_of_sight", "detour", "geodesic"]].to_numpy(np.float64)
-    for room, count, row in zip(described.index, described["episodes"], shares, strict=True):
+    for scene, count, row in zip(described.index, described["episodes"], shares, strict=True):
         other, hidden, detour, geodesic = row
         cells = (f"{100 * other:.0f} %", f"{100 * hidden:.0f} %", f"{detour:.2f}")
-        table.add_row(readable(str(room)), str(count), *cells, f"{geodesic:.1f} m")
+        table.add_row(readable(str(scene)), str(count), *cells, f"{geodesic:.1f} m")
     return table
 
 
@@ -104,7 +104,19 @@ def print_tables(
     console: Console | None = None,
     privileged: Collection[str] = (),
 ) -> None:
-    """Print the results and how hard the starts are."""
+    """Print the results and the difficulty of the starts.
+
+    Parameters
+    ----------
+    results : DataFrame
+        As in `results.csv`.
+    episodes : DataFrame
+        As in `episodes.csv`.
+    console : Console, optional
+        `wide_console()` by default.
+    privileged : collection of str
+        Agents that are marked as upper bounds.
+    """
     console = console or wide_console()
     for table in (results_table(results, privileged), hardness_table(episodes)):
         console.print(table)
@@ -112,21 +124,21 @@ def print_tables(
 
 
 def wide_console() -> Console:
-    """A console that does not cut the table off where the output is a file or a pipe."""
+    """Create a console that is 120 characters wide if the output is a file or a pipe."""
     console = Console()
     return console if console.is_terminal else Console(width=120)
 
 
 def _paper_cells() -> dict[tuple[str, ...], str]:
-    """The paper's cells by agent, protocol, sound and room."""
+    """Format the paper's results by agent, protocol, sound and scene."""
     table = paper_table()
     means = table.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
     table = pd.concat([table, means.assign(sound=ALL_SOUNDS)])
     keys = zip(table["agent"], table["sound"], table["scene"], strict=True)
-    figures = table[["sr", "spl"]].to_numpy()
+    metrics = table[["sr", "spl"]].to_numpy()
     return {
-        (agent, PAPER_PROTOCOL, sound, room): _cell(*row)
-        for (agent, sound, room), row in zip(keys, figures, strict=True)
+        (agent, PAPER_PROTOCOL, sound, scene): _cell(*row)
+        for (agent, sound, scene), row in zip(keys, metrics, strict=True)
     }
 
 
@@ -136,6 +148,6 @@ def _cell(sr: float, spl: float) -> str:
     return "/".join("100" if value >= 99.95 else f"{value:.1f}" for value in (sr, spl))
 
 
-def readable(room: str) -> str:
-    """The name of a room for people."""
-    return room.replace("_", " ").capitalize()
+def readable(scene: str) -> str:
+    """Format the name of a scene, such as `Room 1`."""
+    return scene.replace("_", " ").capitalize()

@@ -1,4 +1,4 @@
-"""Episodes on the floor plan, as in the paper's figure 4, and where the source was heard."""
+"""Figures of trajectories on the floor plan, as in figure 4 of the paper, and source estimates."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from avn.navigation.place import Place
 from avn.navigation.trace import Trace
 from avn.reporting.floor_plan_figure import draw_floor_plan
 
-# A colour for each run that is compared; they tell each other apart for colour-blind eyes too.
+# Colours of compared runs, distinguishable with colour vision deficiency.
 RUN_COLOURS = ("#d1495b", "#1f6fb2", "#3a9a5b", "#8a5fbf", "#c98a1b", "#4d4d4d")
 FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 
 def plan_of(trace: Trace) -> FloorPlan | None:
-    """The floor plan of a trace's apartment; None where it was drawn as text."""
+    """Return the floor plan of a trace's apartment; None if it was drawn as text."""
     return getattr(trace.place, "plan", None)
 
 
 def draw_place(axes: Axes, trace: Trace) -> None:
-    """Draw a trace's apartment faintly, in metres, and the source."""
+    """Draw a trace's apartment in faint colours, in metres, and the source."""
     draw_apartment(axes, trace.place)
     axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=15, zorder=12)
 
 
 def draw_apartment(axes: Axes, place: Place) -> None:
-    """Draw an apartment faintly, in metres: its floor plan, or its cells where it has none."""
+    """Draw an apartment in faint colours, in metres: its floor plan, or its cells without one."""
     plan: FloorPlan | None = getattr(place, "plan", None)
     if plan is None:
         for x, y in place.grid.centres:
@@ -45,7 +45,7 @@ def draw_apartment(axes: Axes, place: Place) -> None:
         axes.autoscale_view()
     else:
         draw_floor_plan(axes, plan, place.grid)
-        for line in list(axes.lines):  # cells, edges and all sources would hide the walks
+        for line in list(axes.lines):  # cells, edges and sources would hide the paths
             line.remove()
         for text in list(axes.texts):
             text.remove()
@@ -62,7 +62,7 @@ def draw_apartment(axes: Axes, place: Place) -> None:
 def draw_walk(
     axes: Axes, trace: Trace, colour: str, label: str | None = None, shift: float = 0.0
 ) -> None:
-    """Draw the path of an episode with its start, its end and the way it looked at the start.
+    """Draw the path of an episode with its start, end, collisions and initial heading.
 
     Parameters
     ----------
@@ -70,18 +70,18 @@ def draw_walk(
     trace : Trace
     colour : str
     label : str, optional
-        For the legend.
+        Label in the legend.
     shift : float
-        Metres that the line is moved to the north-east, so that paths that meet stay visible.
+        Shift to the north-east in metres, which keeps overlapping paths visible.
     """
     path = trace.path + shift
     axes.plot(*path.T, color=colour, linewidth=2.2, alpha=0.9, zorder=9, label=label)
     moved = np.flatnonzero(np.any(np.diff(path, axis=0) != 0, axis=1))
     for at in moved[len(moved) > 6 :: 4]:
         middle, way = path[at : at + 2].mean(axis=0), path[at + 1] - path[at]
-        look: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "lw": 0}
-        look["mutation_scale"] = 14
-        axes.annotate("", middle + 0.18 * way, middle - 0.18 * way, arrowprops=look, zorder=10)
+        style: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "lw": 0}
+        style["mutation_scale"] = 14
+        axes.annotate("", middle + 0.18 * way, middle - 0.18 * way, arrowprops=style, zorder=10)
     bumps = path[trace.collided]
     axes.plot(*bumps.T, "x", color=colour, markersize=5, mew=1.2, zorder=10)
     front = FRONT[trace.state[0] % HEADINGS]
@@ -94,20 +94,20 @@ def draw_walk(
 
 
 def trajectory_figure(episodes: Sequence[Sequence[Trace]], names: Sequence[str]) -> Figure:
-    """Draw episodes on the floor plan, each as several runs walked it.
+    """Draw the trajectories of several runs in the same episodes.
 
     Parameters
     ----------
     episodes : sequence of sequences of Trace
         By episode and run.
     names : sequence of str
-        Of the runs.
+        Names of the runs.
 
     Returns
     -------
     Figure
-        A panel for each episode: ring at the start, square at an end that succeeded and cross at
-        one that did not, small crosses where it ran into something, a star at the source.
+        A panel for each episode: ring at the start, square at a successful end, cross at a failed
+        one, small crosses at collisions, star at the source.
     """
     columns = min(2, len(episodes))
     rows = -(-len(episodes) // columns)
@@ -129,36 +129,39 @@ def trajectory_figure(episodes: Sequence[Sequence[Trace]], names: Sequence[str])
 
 
 def estimate_figure(trace: Trace, name: str) -> Figure:
-    """Draw where the source was heard at each step, and how far off that was.
+    """Draw the source estimate of each step and its error.
 
     Raises
     ------
     ValueError
-        Where the agent did not hear.
+        If the agent has no source estimates.
     """
-    if trace.heard is None:
-        raise ValueError("this agent did not hear where the source is")
+    if trace.source_estimates is None:
+        raise ValueError("this agent has no source estimates")
     figure = figure_of(11.5, 5.6)
     left, right = figure.subplots(1, 2, width_ratios=(1.35, 1))
     draw_place(left, trace)
     draw_walk(left, trace, "#777777")
-    steps = np.arange(len(trace.heard))
-    look: dict[str, Any] = {"c": steps, "cmap": "viridis", "zorder": 8}
-    lines = np.stack((trace.path, trace.heard), axis=1)
+    steps = np.arange(len(trace.source_estimates))
+    style: dict[str, Any] = {"c": steps, "cmap": "viridis", "zorder": 8}
+    lines = np.stack((trace.path, trace.source_estimates), axis=1)
     for line, step in zip(lines, steps, strict=True):
         left.plot(*line.T, color=cmap(step / max(1, len(steps) - 1)), lw=0.5, alpha=0.5, zorder=7)
-    dots = left.scatter(*trace.heard.T, s=34, edgecolor="white", linewidth=0.5, **look)
+    dots = left.scatter(*trace.source_estimates.T, s=34, edgecolor="white", linewidth=0.5, **style)
     bar = figure.colorbar(dots, ax=left, orientation="horizontal", fraction=0.04, pad=0.02)
-    bar.set_label("action at which it was heard there")
+    bar.set_label("step of the estimate")
     left.set_title(f"{name}\n{title_of(trace)}", fontsize=10)
-    (x0, x1), (y0, y1) = left.get_xlim(), left.get_ylim()  # some of what is heard lies outside
-    (low_x, low_y), (high_x, high_y) = trace.heard.min(0) - 0.3, trace.heard.max(0) + 0.3
+    (x0, x1), (y0, y1) = left.get_xlim(), left.get_ylim()  # some estimates are outside
+    (low_x, low_y), (high_x, high_y) = (
+        trace.source_estimates.min(0) - 0.3,
+        trace.source_estimates.max(0) + 0.3,
+    )
     left.set_xlim(max(min(x0, low_x), x0 - 2), min(max(x1, high_x), x1 + 2))
     left.set_ylim(max(min(y0, low_y), y0 - 2), min(max(y1, high_y), y1 + 2))
-    error = np.linalg.norm(trace.heard - trace.goal, axis=1)
+    error = np.linalg.norm(trace.source_estimates - trace.goal, axis=1)
     away = np.linalg.norm(trace.path - trace.goal, axis=1)
-    right.plot(steps, error, color="#1f6fb2", label="estimate to source")
-    right.plot(steps, away, color="#777777", ls="--", label="agent to source")
+    right.plot(steps, error, color="#1f6fb2", label="error of the source estimate")
+    right.plot(steps, away, color="#777777", ls="--", label="distance from agent to source")
     right.set(xlabel="action", ylabel="metres", ylim=(0, None), xlim=(0, max(1, len(steps) - 1)))
     right.grid(alpha=0.3)
     right.legend(frameon=False)
@@ -166,7 +169,7 @@ def estimate_figure(trace: Trace, name: str) -> Figure:
 
 
 def cmap(share: float) -> tuple[float, float, float, float]:
-    """The colour of a step, by its share of the episode."""
+    """Return the RGBA colour of a step by its share of the episode, 0 to 1."""
     from matplotlib import colormaps
 
     colour: tuple[float, float, float, float] = colormaps["viridis"](share)
@@ -174,7 +177,7 @@ def cmap(share: float) -> tuple[float, float, float, float]:
 
 
 def title_of(trace: Trace) -> str:
-    """Which episode it is, in words."""
+    """Describe the episode of a trace: scene, sound, number and start."""
     record = trace.record
     sight = "in sight" if record["in_sight"] else "out of sight"
     return (
@@ -184,19 +187,22 @@ def title_of(trace: Trace) -> str:
 
 
 def outcome(trace: Trace) -> str:
-    """How an episode ended, in words."""
+    """Describe the outcome of an episode: result, SPL and number of actions."""
     word = str(trace.record["outcome"]).replace("_", " ")
     return f"{word}, SPL {trace.record['spl']:.2f}, {len(trace.action)} actions"
 
 
 def figure_of(width: float, height: float) -> Figure:
-    """An empty figure of so many inches that needs no display."""
+    """Create an empty figure, with width and height in inches, without a display."""
     figure = Figure(figsize=(width, height), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def extent(low: NDArray[np.int64], shape: tuple[int, ...]) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top in metres of an array of squares (H, W) from `low` on."""
+    """Return left, right, bottom and top in metres of an array of squares.
+
+    `low` is the lattice index (x, y) of the first square, `shape` the array's (H, W).
+    """
     x, y = (low - 0.5) * CELL
     return (x, x + shape[1] * CELL, y, y + shape[0] * CELL)

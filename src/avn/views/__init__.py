@@ -1,0 +1,1 @@
+"""Rendering of the agent's views: meshes, materials, light, cameras and visual features."""

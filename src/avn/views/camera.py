@@ -1,4 +1,4 @@
-"""The agent's camera: where it stands and which way each pixel looks."""
+"""Pinhole camera of the agent: its settings and the ray direction of each pixel."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from avn.core.errors import UserError
 
 @dataclass
 class CameraConfig:
-    """A pinhole camera with square pictures, at the centre of the agent's cell.
+    """Pinhole camera with square images, at the centre of the agent's cell.
 
     Attributes
     ----------
     height : float
-        Metres over the floor.
+        Metres above the floor.
     pitch : float
-        Degrees upward; negative looks down.
+        Pitch angle in degrees; negative points the camera down.
     fov : float
-        Degrees between the left and the right edge of the picture.
+        Horizontal field of view in degrees.
     size : int
-        Pixels along each side.
+        Image side in pixels.
     """
 
     height: float = 1.5
@@ -36,7 +36,7 @@ class CameraConfig:
 def ray_directions(
     camera: CameraConfig, heading: int, size: int, samples: int = 1
 ) -> NDArray[np.float64]:
-    """Directions of the rays through each pixel.
+    """Compute the directions of the rays through each pixel.
 
     Parameters
     ----------
@@ -44,19 +44,19 @@ def ray_directions(
     heading : int
         0 north, 1 east, 2 south, 3 west.
     size : int
-        Pixels along each side.
+        Image side in pixels.
     samples : int
-        Rays along each side of a pixel, evenly spread.
+        Rays along each side of a pixel, on a regular grid.
 
     Returns
     -------
     (size, size, samples ** 2, 3) float64
-        Unit vectors x east, y north, z up. Row 0 is the top of the picture, column 0 its left.
+        Unit vectors (east, north, up). Row 0 is the top of the image, column 0 its left edge.
 
     Raises
     ------
     UserError
-        Where the field of view is not between 0 and 180 degrees.
+        If the field of view is not between 0 and 180 degrees.
     """
     if not 0 < camera.fov < 180:
         raise UserError(f"renderer.camera.fov: {camera.fov}; give degrees between 0 and 180")
@@ -66,7 +66,7 @@ def ray_directions(
     pitch = math.radians(camera.pitch)
     front = math.cos(pitch) - up * math.sin(pitch)
     z = math.sin(pitch) + up * math.cos(pitch)
-    sin, cos = ((0, 1), (1, 0), (0, -1), (-1, 0))[heading]  # east and north part of the front
+    sin, cos = ((0, 1), (1, 0), (0, -1), (-1, 0))[heading]  # of the forward direction
     rays = np.stack((front * sin + right * cos, front * cos - right * sin, z), axis=-1)
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     blocks = rays.reshape(size, samples, size, samples, 3).transpose(0, 2, 1, 3, 4)

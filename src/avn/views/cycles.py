@@ -1,7 +1,7 @@
-"""`renderer=cycles`: the same views by Blender's path tracer (extra `render`).
+"""`renderer=cycles`: views path-traced by Blender Cycles (extra `render`).
 
-What is seen, its light and the camera are those of `renderer=raycast`; Blender follows the light
-from each pixel instead of looking it up, and the same film takes it.
+Scene, light sources, camera and tone mapping are those of `renderer=raycast`. Cycles traces light
+paths from each pixel, where `raycast` looks up baked irradiance.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import FloorPlan
 from avn.core.errors import UserError
 from avn.views import shading
-from avn.views.eye import Eye
 from avn.views.lighting import LightConfig
+from avn.views.ray_camera import RayCamera
 from avn.views.raycast import Raycast, RaycastConfig
 from avn.views.rays import Triangles
 from avn.views.renderer import Prepared, Renderer, RendererConfig, check_light, check_range
-from avn.views.scenery import Scenery, scenery
+from avn.views.scene_mesh import SceneMesh, scene_mesh
 
 _INSTALL = (
     "renderer=cycles: Blender's module bpy {}; `pip install 'avn[render]'`, on a bare Debian also "
@@ -43,13 +43,13 @@ class CyclesConfig(RendererConfig):
     Attributes
     ----------
     samples : int
-        Paths a pixel.
+        Light paths a pixel.
     bounces : int
-        How often light is passed on.
+        Maximum number of light bounces.
     denoise : bool
-        Whether Open Image Denoise goes over each picture.
+        Apply Open Image Denoise to each image.
     light : LightConfig
-        Of the light that is baked to find the exposure, no more.
+        Settings of the baked light, from which only the exposure is computed.
     """
 
     _target_: str = "avn.views.cycles.Cycles"
@@ -63,9 +63,12 @@ class CyclesConfig(RendererConfig):
 
 
 class Cycles(Renderer):
-    """Views by Blender; see `Renderer`."""
+    """Renderer that path-traces views with Blender Cycles.
 
-    # Blender has one scene a process: whose it is now.
+    See `Renderer` for the parameters.
+    """
+
+    # Blender has one scene a process; this is the renderer that it belongs to now.
     _owner: ClassVar[Cycles | None] = None
 
     def __init__(
@@ -73,15 +76,15 @@ class Cycles(Renderer):
         cfg: CyclesConfig,
         plan: FloorPlan,
         part: str,
-        look: int = 0,
+        appearance_seed: int = 0,
         prepared: Prepared | None = None,
     ) -> None:
         self.check(cfg)
         self.cfg = cfg
-        self._made_from = (plan, part, look)
-        self._scenery = scenery(plan, part, look)
+        self._made_from = (plan, part, appearance_seed)
+        self._scene = scene_mesh(plan, part, appearance_seed)
         self._prepared = prepared
-        self._eye = Eye(cfg.camera, Triangles(self._scenery.mesh.vertices))
+        self._camera = RayCamera(cfg.camera, Triangles(self._scene.mesh.vertices))
 
     @classmethod
     def check(cls, cfg: RendererConfig) -> None:
@@ -95,7 +98,7 @@ class Cycles(Renderer):
             raise UserError(_INSTALL.format("is not installed"))
 
     def prepare(self) -> Prepared:
-        """The exposure that suits the apartment's light."""
+        """Compute the exposure of the apartment from coarsely baked light."""
         if self._prepared is None:
             light = dataclasses.replace(self.cfg.light, bounces=self.cfg.bounces)
             coarse = RaycastConfig(camera=self.cfg.camera, light=light)
@@ -111,7 +114,7 @@ class Cycles(Renderer):
         size = self.cfg.camera.size
         exposure = float(self.prepare()["exposure"])
         if Cycles._owner is not self:
-            _build(bpy, self._scenery, self.cfg, exposure)
+            _build(bpy, self._scene, self.cfg, exposure)
             Cycles._owner = self
         camera = bpy.context.scene.camera
         rgb = np.empty((len(centres), size, size, 3), dtype=np.uint8)
@@ -124,9 +127,9 @@ class Cycles(Renderer):
                 pitch = math.radians(90 + self.cfg.camera.pitch)
                 camera.rotation_euler = (pitch, 0.0, -math.pi / 2 * int(heading))
                 bpy.ops.render.render(write_still=True)
-                shown = shading.develop(_pixels(bpy, picture, size) * np.float32(exposure))
+                shown = shading.tone_map_pixels(_pixels(bpy, picture, size) * np.float32(exposure))
                 rgb[n] = shading.encode(shown).reshape(size, size, 3)
-                depth[n] = self._eye.depth(centre, int(heading))
+                depth[n] = self._camera.depth(centre, int(heading))
         return rgb, depth
 
 
@@ -138,7 +141,7 @@ def _blender() -> Any:
 
 
 def _pixels(bpy: Any, picture: Path, size: int) -> NDArray[np.float32]:
-    """Linear light (size, size, 3) of a rendered file."""
+    """Read the linear RGB (size, size, 3) of a rendered file."""
     image = bpy.data.images.load(str(picture), check_existing=False)
     image.colorspace_settings.name = "Non-Color"
     flat = np.empty(size * size * 4, dtype=np.float32)
@@ -147,13 +150,13 @@ def _pixels(bpy: Any, picture: Path, size: int) -> NDArray[np.float32]:
     return np.ascontiguousarray(flat.reshape(size, size, 4)[::-1, :, :3])
 
 
-def _build(bpy: Any, what: Scenery, cfg: CyclesConfig, exposure: float) -> None:
-    """Empty Blender's scene and fill it anew."""
+def _build(bpy: Any, apartment: SceneMesh, cfg: CyclesConfig, exposure: float) -> None:
+    """Reset Blender's scene and add an apartment, its light and the camera."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     _settings(scene, cfg)
     scene.world = bpy.data.worlds.new("dark")
-    _mesh(bpy, what, exposure)
+    _mesh(bpy, apartment, exposure)
     data = bpy.data.cameras.new("camera")
     data.angle = math.radians(cfg.camera.fov)
     data.clip_start, data.clip_end = 0.01, 100.0
@@ -180,7 +183,7 @@ def _settings(scene: Any, cfg: CyclesConfig) -> None:
     cycles.use_adaptive_sampling = False
     cycles.use_light_tree = False
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = cfg.bounces
-    cycles.sample_clamp_indirect = 0.0  # or ceilings over lamps stay dark
+    cycles.sample_clamp_indirect = 0.0  # clamping would darken ceilings above lamps
     cycles.caustics_reflective = cycles.caustics_refractive = False
     cycles.use_denoising = cfg.denoise
     if cfg.denoise:
@@ -189,9 +192,9 @@ def _settings(scene: Any, cfg: CyclesConfig) -> None:
         cycles.denoising_quality = "HIGH"
 
 
-def _mesh(bpy: Any, what: Scenery, exposure: float) -> None:
-    """One object: a slot for each picture, with and without light of its own."""
-    mesh = what.mesh
+def _mesh(bpy: Any, apartment: SceneMesh, exposure: float) -> None:
+    """Add an apartment as one object, with a material slot for each texture and emission."""
+    mesh = apartment.mesh
     count = len(mesh)
     data = bpy.data.meshes.new("apartment")
     data.vertices.add(3 * count)
@@ -200,22 +203,26 @@ def _mesh(bpy: Any, what: Scenery, exposure: float) -> None:
     data.loops.foreach_set("vertex_index", np.arange(3 * count, dtype=np.int32))
     data.polygons.add(count)
     data.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
-    own = (what.glow.max(axis=1) > 0) | (what.shine.max(axis=1) > 0)
+    own = (apartment.emission.max(axis=1) > 0) | (apartment.radiance.max(axis=1) > 0)
     kinds, slot = np.unique(2 * mesh.texture + own, return_inverse=True)
     data.polygons.foreach_set("material_index", slot.astype(np.int32).ravel())
     data.uv_layers.new(name="uv").data.foreach_set("uv", mesh.uv.ravel())
-    # light that the film gets is as exposed already
-    faces = {"colour": mesh.colour, "glow": what.glow / exposure, "shine": what.shine}
+    # emission is given as exposed
+    faces = {
+        "colour": mesh.colour,
+        "emission": apartment.emission / exposure,
+        "radiance": apartment.radiance,
+    }
     for name, values in faces.items():
         attribute = data.attributes.new(name, "FLOAT_VECTOR", "FACE")
         attribute.data.foreach_set("vector", np.ascontiguousarray(values, np.float32).ravel())
     pictures = list(_pictures(bpy, mesh.textures))
     for kind in kinds:
-        texture, shines = int(kind) // 2, bool(kind % 2)
-        data.materials.append(_material(bpy, pictures[texture] if texture >= 0 else None, shines))
+        texture, emits = int(kind) // 2, bool(kind % 2)
+        data.materials.append(_material(bpy, pictures[texture] if texture >= 0 else None, emits))
     data.update()
-    thing = bpy.data.objects.new("apartment", data)
-    bpy.context.scene.collection.objects.link(thing)
+    body = bpy.data.objects.new("apartment", data)
+    bpy.context.scene.collection.objects.link(body)
 
 
 def _pictures(bpy: Any, textures: tuple[NDArray[np.uint8], ...]) -> Iterator[Any]:
@@ -229,8 +236,8 @@ def _pictures(bpy: Any, textures: tuple[NDArray[np.uint8], ...]) -> Iterator[Any
         yield image
 
 
-def _material(bpy: Any, picture: Any, shines: bool) -> Any:
-    """A matt surface in the colour of its faces times a picture; one that shines does both."""
+def _material(bpy: Any, picture: Any, emits: bool) -> Any:
+    """Create a diffuse material, face colour times texture, or an emissive one."""
     material = bpy.data.materials.new("surface")
     material.use_nodes = True
     nodes, link = material.node_tree.nodes, material.node_tree.links.new
@@ -254,22 +261,22 @@ def _material(bpy: Any, picture: Any, shines: bool) -> Any:
         node.image = picture
         texel = node.outputs["Color"]
     output = nodes.new("ShaderNodeOutputMaterial")
-    if not shines:
+    if not emits:
         colour = attribute("colour")
         surface = nodes.new("ShaderNodeBsdfDiffuse")
         link(colour if texel is None else times(colour, texel), surface.inputs["Color"])
         link(surface.outputs["BSDF"], output.inputs["Surface"])
         return material
-    glow = attribute("glow")
+    emission = attribute("emission")
     mix = nodes.new("ShaderNodeMix")
     mix.data_type = "RGBA"
     path = nodes.new("ShaderNodeLightPath")
     link(path.outputs["Is Camera Ray"], mix.inputs["Factor"])
     colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
-    link(attribute("shine"), colours[0])
-    link(glow if texel is None else times(glow, texel), colours[1])
-    emission = nodes.new("ShaderNodeEmission")
+    link(attribute("radiance"), colours[0])
+    link(emission if texel is None else times(emission, texel), colours[1])
+    shader = nodes.new("ShaderNodeEmission")
     result = next(socket for socket in mix.outputs if socket.type == "RGBA")
-    link(result, emission.inputs["Color"])
-    link(emission.outputs["Emission"], output.inputs["Surface"])
+    link(result, shader.inputs["Color"])
+    link(shader.outputs["Emission"], output.inputs["Surface"])
     return material

@@ -1,4 +1,4 @@
-"""What the drawing of patterns and light rests on: named random numbers, noise, tilings, sRGB."""
+"""Basics of procedural textures: seeded random generators, noise, tilings, sRGB conversion."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ Image = NDArray[np.float64]
 
 
 def draw(*names: object) -> np.random.Generator:
-    """Random numbers that are a function of names, the same on every machine."""
+    """Create a random generator that is seeded by names and equal on every machine."""
     text = "\x1f".join(str(name) for name in names)
     seed = int.from_bytes(hashlib.sha256(text.encode()).digest()[:16], "little")
     return np.random.Generator(np.random.PCG64(seed))
 
 
 def to_linear(srgb: NDArray) -> NDArray[np.float64]:
-    """Linear light, 0 to 1, of sRGB values 0 to 1 (IEC 61966-2-1)."""
+    """Convert sRGB values to linear ones, both 0 to 1 (IEC 61966-2-1)."""
     value = np.asarray(srgb, dtype=np.float64)
     return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
 def to_srgb(linear: NDArray) -> NDArray[np.float64]:
-    """SRGB values 0 to 1 of linear light, clipped to 0 to 1 (IEC 61966-2-1)."""
+    """Convert linear values, clipped to 0 to 1, to sRGB ones (IEC 61966-2-1)."""
     value = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
     return np.where(value <= 0.0031308, value * 12.92, 1.055 * value ** (1 / 2.4) - 0.055)
 
@@ -32,7 +32,7 @@ def to_srgb(linear: NDArray) -> NDArray[np.float64]:
 def noise(
     rng: np.random.Generator, shape: tuple[int, int], slope: float, stretch: float = 1.0
 ) -> Image:
-    """Noise that repeats at the picture's edges, mean 0 and deviation 1.
+    """Draw tileable noise of mean 0 and standard deviation 1.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def noise(
     shape : (int, int)
         Rows and columns.
     slope : float
-        Amplitude falls with frequency to this power; 0 is white.
+        Exponent with which the amplitude falls with frequency; 0 is white noise.
     stretch : float
-        How much longer than high its grains are.
+        Anisotropy: factor on the horizontal frequency.
     """
     fy = np.fft.fftfreq(shape[0])[:, None] * shape[0]
     fx = np.fft.rfftfreq(shape[1])[None, :] * shape[1] * stretch
@@ -57,14 +57,23 @@ def noise(
 def bond(
     pixels: int, rows: int, columns: int, shift: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], Image]:
-    """Courses of equal stones, each course pushed along by `shift` (rows,) of a stone.
+    """Lay rectangular stones in courses, as in a brick bond.
+
+    Parameters
+    ----------
+    pixels : int
+        Image side in pixels.
+    rows, columns : int
+        Number of courses, and of stones in each.
+    shift : (rows,) float64
+        Horizontal shift of each course in stones.
 
     Returns
     -------
     (pixels, pixels) int64
-        Number of the stone at each pixel.
+        Index of the stone at each pixel.
     (pixels, pixels) float64
-        How far the nearest joint is, in parts of the picture's side.
+        Distance to the nearest joint as a fraction of the image side.
     """
     at = (np.arange(pixels) + 0.5) / pixels
     v = at[:, None] * rows
@@ -80,7 +89,24 @@ def bond(
 
 
 def herringbone(pixels: int, length: int, repeats: int) -> tuple[NDArray[np.int64], Image]:
-    """Staves `length` times as long as wide, laid at right angles; as `bond` returns."""
+    """Lay staves in a herringbone pattern.
+
+    Parameters
+    ----------
+    pixels : int
+        Image side in pixels.
+    length : int
+        Ratio of length to width of a stave.
+    repeats : int
+        Repeats of the pattern along the image side.
+
+    Returns
+    -------
+    (pixels, pixels) int64
+        Index of the stave at each pixel.
+    (pixels, pixels) float64
+        Distance to the nearest joint as a fraction of the image side.
+    """
     cells = 2 * length * repeats
     at = (np.arange(pixels) + 0.5) / pixels * cells
     x, y = np.meshgrid(at, at)

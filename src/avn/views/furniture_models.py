@@ -1,13 +1,13 @@
-"""The furniture models that the package holds: their catalogue and their triangles.
+"""Furniture models of the package: their catalogue and their triangles.
 
-`assets/furniture/catalogue.json` names each model, the kinds of piece that it can stand for, the
-pool (train, validation, test) that it belongs to, its true size, author and licence. Its
-triangles lie in `<id>.npz`, made by `scripts/extract_furniture.py`:
+`assets/furniture/catalogue.json` lists for each model its name, the kinds of piece that it can
+represent, its split part (`pool`: train, validation or test), true size, author and licence. Its
+triangles are in `<id>.npz`, made by `scripts/extract_furniture.py`:
 
-- `points` (P, 3) uint16: corners in the frame of the piece, u to the right of somebody who looks
-  the way the piece faces, v the way it faces, w up; 0 and 65535 are the faces of its box;
-- `uv` (P, 2) float32, v up, where there are pictures;
-- `faces` (T, 3) uint16: three points each. They are to be seen from both sides;
+- `points` (P, 3) uint16: vertices in the frame of the piece, v forward (the way the piece faces),
+  u to the right of forward, w up; 0 and 65535 are the faces of its bounding box;
+- `uv` (P, 2) float32, v up, if the model has textures;
+- `faces` (T, 3) uint16: indices of three points each. Triangles are two-sided;
 - `material` (T,) uint8, `colour` (M, 3) float32 linear, `texture` (M,) int8 (-1: plain colour);
 - `picture_0`, `picture_1`, ... uint8: the bytes of JPEG files.
 """
@@ -26,28 +26,28 @@ from numpy.typing import NDArray
 from PIL import Image
 
 FOLDER = Path(__file__).parents[1] / "assets" / "furniture"
-# The largest coordinate of `points`.
+# Largest coordinate of `points`.
 STEPS = 65535
 
 
 @dataclass(frozen=True)
 class FurnitureModel:
-    """A row of the catalogue.
+    """Catalogue entry of a furniture model.
 
     Attributes
     ----------
     name : str
         Its file is `<name>.npz`.
     kinds : tuple of str
-        Kinds of piece that it can stand for.
+        Kinds of piece that it can represent.
     pool : str
-        The part of a split that it belongs to.
+        Split part that uses it: train, validation or test.
     size : tuple of float
         True width, depth and height in metres.
     row : bool
-        Whether several may stand side by side in one wide piece, as cupboards do.
+        True if copies may stand side by side in one wide piece, such as cupboards.
     title, author, licence, source : str
-        What it is called, whose work it is, on which terms and from where.
+        Attribution of the original work.
     """
 
     name: str
@@ -63,19 +63,20 @@ class FurnitureModel:
 
 @dataclass(frozen=True)
 class ModelTriangles:
-    """T triangles in the frame of the piece, each coordinate from 0 to 1.
+    """T triangles in the frame of the piece, with coordinates from 0 to 1.
 
     Attributes
     ----------
     vertices : (T, 3, 3) float32
-        u right, v the way it faces, w up.
+        u right, v forward, w up.
     uv : (T, 3, 2) float32
+        Texture coordinates, v up.
     texture : (T,) int32
-        Index into `pictures`, -1 for plain colour.
+        Index into `pictures`; -1 for plain colour.
     colour : (T, 3) float32
-        Linear RGB.
+        Linear RGB albedo.
     pictures : tuple of (h, w, 3) uint8
-        sRGB.
+        sRGB textures.
     """
 
     vertices: NDArray[np.float32]
@@ -87,7 +88,7 @@ class ModelTriangles:
 
 @cache
 def catalogue() -> tuple[FurnitureModel, ...]:
-    """Every model of the package, by name."""
+    """Load the catalogue of all models, in the order of its file."""
     rows = json.loads((FOLDER / "catalogue.json").read_text(encoding="utf-8"))
     return tuple(
         FurnitureModel(**{**row, "kinds": tuple(row["kinds"]), "size": tuple(row["size"])})
@@ -97,7 +98,7 @@ def catalogue() -> tuple[FurnitureModel, ...]:
 
 @lru_cache(maxsize=256)
 def load_model(name: str) -> ModelTriangles:
-    """The triangles of a model; loaded once, not to be written to."""
+    """Load the triangles of a model; the cached arrays must not be modified."""
     with np.load(FOLDER / f"{name}.npz") as data:
         faces = data["faces"].astype(np.int64)
         vertices = (data["points"].astype(np.float32) / np.float32(STEPS))[faces]
@@ -113,7 +114,7 @@ def load_model(name: str) -> ModelTriangles:
 
 @cache
 def assets_hash() -> str:
-    """A hash of the catalogue and of every model, for the hash of what is made from them."""
+    """Return a hash of the catalogue and all models, for fingerprints of rendered views."""
     content = hashlib.sha256()
     for path in sorted([FOLDER / "catalogue.json", *FOLDER.glob("*.npz")]):
         content.update(path.name.encode())

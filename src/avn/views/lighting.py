@@ -1,10 +1,10 @@
-"""Light that is baked once an apartment: the irradiance at every corner of every triangle.
+"""Light baking: irradiance at the vertices of an apartment's mesh.
 
-Direct light comes from spheres and rectangles by shadow rays; light that surfaces pass on is
-gathered with one set of rays, cosine-distributed over the hemisphere, whose hits are kept, so
-that each further bounce is a sum (the radiosity equation, J. T. Kajiya, "The rendering equation",
-SIGGRAPH 1986, for matt surfaces). Triangles that lie close together and face the same way share
-one point; what is found there is spread to their corners, which also smooths it.
+Direct light of spheres and rectangles is sampled with shadow rays. Indirect light is gathered
+with one set of cosine-distributed rays per point, whose hits are stored, so that each bounce is
+a sum (J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, for diffuse surfaces). Adjacent
+triangles of similar orientation share one sample point. Its irradiance is averaged onto their
+vertices, which also smooths it.
 """
 
 from __future__ import annotations
@@ -15,34 +15,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.views import light_kernels as kernels
+from avn.views import light_rays
 from avn.views.light_points import Points, normals_of
 from avn.views.lights import Lamps, Panes
 from avn.views.mesh import Mesh
 from avn.views.rays import Triangles
 
-# Points that are worked on at once: bounds the memory.
+# Rays that are processed at once, which bounds the memory.
 _AT_ONCE = 1 << 20
-# Rays that tell whether a point is walled in: all end within so many metres.
+# A point is enclosed if its first _FEW rays all end within _NARROW metres.
 _FEW = 12
 _NARROW = 0.5
 
 
 @dataclass
 class LightConfig:
-    """How finely light is baked.
+    """Resolution and sampling of the baked light.
 
     Attributes
     ----------
     spacing : float
-        Metres between points that light is gathered at.
+        Metres between sample points.
     shadow_rays : int
-        For each point and source of light.
+        Shadow rays per sample point and light source.
     gather_rays : int
-        For each point.
+        Rays per sample point for indirect light.
     bounces : int
-        How often light is passed on.
+        Number of indirect bounces.
     smoothing : int
-        How often what is passed on is averaged with its surroundings.
+        Number of smoothing passes over the indirect light.
     """
 
     spacing: float = 0.07
@@ -55,44 +56,46 @@ class LightConfig:
 def bake(
     mesh: Mesh,
     albedo: NDArray[np.float32],
-    shade: NDArray[np.bool_],
+    occluder: NDArray[np.bool_],
     lamps: Lamps,
     panes: Panes,
     cfg: LightConfig,
     points: Points,
 ) -> NDArray[np.float32]:
-    """Irradiance at the corners of a mesh.
+    """Bake the irradiance at the vertices of a mesh.
 
     Parameters
     ----------
     mesh : Mesh
-        T triangles, none much longer than `cfg.spacing`.
+        T triangles, with edges not much longer than `cfg.spacing`.
     albedo : (T, 3) float32
-    shade : (T,) bool
-        Which triangles keep light off others.
-    lamps, panes : Lamps, Panes
+        Linear RGB.
+    occluder : (T,) bool
+        True for triangles that cast shadows.
+    lamps : Lamps
+    panes : Panes
     cfg : LightConfig
     points : Points
-        From `choose_points`.
+        Sample points; see `choose_points`.
 
     Returns
     -------
     (2, V, 3) float32
-        Linear RGB before and behind each corner of `points.corner`.
+        Linear RGB irradiance on the front and back of each vertex of `points.corner`.
     """
-    solid = np.flatnonzero(shade)
+    solid = np.flatnonzero(occluder)
     triangles = Triangles(mesh.vertices[solid])
     normal, area = normals_of(mesh.vertices)
     direct = _direct(triangles, points, lamps, panes, cfg.shadow_rays)
-    seen = _gather(triangles, solid, normal, points, cfg.gather_rays)
-    passed = np.zeros_like(direct)
+    hit_faces = _gather(triangles, solid, normal, points, cfg.gather_rays)
+    indirect = np.zeros_like(direct)
     for _ in range(cfg.bounces):
-        passed = kernels.bounce(seen, direct + passed, albedo, points.front, points.back)
+        indirect = kernels.bounce(hit_faces, direct + indirect, albedo, points.front, points.back)
     weights = np.maximum(area, 1e-8)
     baked = []
     for side in (points.front, points.back):
         sharp = kernels.to_corners(direct, side, points.corner, weights)
-        soft = kernels.to_corners(passed, side, points.corner, weights)
+        soft = kernels.to_corners(indirect, side, points.corner, weights)
         for _ in range(cfg.smoothing):
             soft = kernels.smooth(soft, side, points.corner, weights)
         baked.append(sharp + soft)
@@ -102,15 +105,15 @@ def bake(
 def _direct(
     triangles: Triangles, points: Points, lamps: Lamps, panes: Panes, rays: int
 ) -> NDArray[np.float32]:
-    found = np.zeros((len(points.place), 3), dtype=np.float32)
+    found = np.zeros((len(points.position), 3), dtype=np.float32)
     sources = (len(lamps.centre) + len(panes.corner)) * rays
     if not sources:
         return found
     step = max(1, _AT_ONCE // sources)
     for start in range(0, len(found), step):
         rows = slice(start, start + step)
-        origin, direction, distance, light, owner = kernels.shadow_rays(
-            points.place[rows],
+        origin, direction, distance, light, owner = light_rays.shadow_rays(
+            points.position[rows],
             points.normal[rows],
             start,
             lamps.centre,
@@ -123,8 +126,8 @@ def _direct(
             panes.radiance,
             rays,
         )
-        blocked = triangles.blocked(origin, direction, distance)
-        kernels.add(found[rows], owner, light, blocked)
+        occluded = triangles.occluded(origin, direction, distance)
+        kernels.add(found[rows], owner, light, occluded)
     return found
 
 
@@ -135,24 +138,25 @@ def _gather(
     points: Points,
     rays: int,
 ) -> NDArray[np.int32]:
-    """Which face each point sees along each ray, (P, rays): 2 t before, 2 t + 1 behind, -1 none.
+    """Find the face that each gather ray hits, (P, rays).
 
-    Where the first few rays get nowhere (the insides of furniture) they stand for the others.
+    2 t is the front of triangle t, 2 t + 1 its back, and -1 no hit. Enclosed points, such as
+    those inside furniture, repeat their first few rays.
     """
-    seen = np.empty((len(points.place), rays), dtype=np.int32)
+    faces = np.empty((len(points.position), rays), dtype=np.int32)
     few = min(_FEW, rays)
     step = max(1, _AT_ONCE // rays)
-    for start in range(0, len(seen), step):
-        numbers = np.arange(start, min(start + step, len(seen)))
-        found, far = _look(triangles, solid, normal, points, numbers, 0, few)
-        seen[numbers] = np.resize(found.T, (rays, len(numbers))).T
+    for start in range(0, len(faces), step):
+        numbers = np.arange(start, min(start + step, len(faces)))
+        found, far = _hit_faces(triangles, solid, normal, points, numbers, 0, few)
+        faces[numbers] = np.resize(found.T, (rays, len(numbers))).T
         open_ = numbers[far.max(axis=1) > _NARROW]
         if few < rays:
-            seen[open_, few:] = _look(triangles, solid, normal, points, open_, few, rays)[0]
-    return seen
+            faces[open_, few:] = _hit_faces(triangles, solid, normal, points, open_, few, rays)[0]
+    return faces
 
 
-def _look(
+def _hit_faces(
     triangles: Triangles,
     solid: NDArray[np.int64],
     normal: NDArray[np.float32],
@@ -161,10 +165,10 @@ def _look(
     first: int,
     last: int,
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Faces that some points see along rays `first` to `last`, and how far away they are."""
-    directions = kernels.cosine_rays(points.normal[numbers], numbers, first, last)
-    origins = np.repeat(points.place[numbers], last - first, axis=0)
-    hits = triangles.meet(origins, directions)
+    """Find the faces and distances in metres that rays `first` to `last` of some points hit."""
+    directions = light_rays.cosine_rays(points.normal[numbers], numbers, first, last)
+    origins = np.repeat(points.position[numbers], last - first, axis=0)
+    hits = triangles.intersect(origins, directions)
     met = solid[np.maximum(hits.triangle, 0)]
     behind = np.einsum("ni,ni->n", directions, normal[met]) > 0
     faces = np.where(hits.triangle < 0, -1, 2 * met + behind).astype(np.int32)

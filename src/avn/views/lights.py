@@ -1,4 +1,4 @@
-"""Lamps and windows as sources of light; strengths are relative, for pictures are exposed."""
+"""Lamps and windows as light sources; intensities are relative, since images are exposed."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import WALL_THICKNESS, FloorPlan, Window
+from avn.views.appearance_palettes import LIGHT
 from avn.views.drawing import draw
-from avn.views.pools import LIGHT
 
 LAMP_RADIUS = 0.13
-# Intensity of a lamp for each square metre of its room.
+# Intensity of a lamp per square metre of its room.
 _LAMP_STRENGTH = 0.35
-# Radiance of the usual sky.
+# Radiance of a window pane under a sky of colour 1.
 PANE_RADIANCE = 3.0
 
 
 @dataclass(frozen=True)
 class Light:
-    """How an apartment is lit: colours and strengths, 1 being usual.
+    """Colours of an apartment's lamps and sky.
 
     Attributes
     ----------
     lamp, sky : (3,) float64
-        Linear RGB.
+        Linear RGB, relative to a usual brightness of 1.
     """
 
     lamp: NDArray[np.float64]
@@ -34,7 +34,7 @@ class Light:
 
 @dataclass(frozen=True)
 class Lamps:
-    """L glowing spheres.
+    """L spherical light sources.
 
     Attributes
     ----------
@@ -43,7 +43,8 @@ class Lamps:
     radius : float
         Metres.
     intensity : (L, 3) float64
-        Linear RGB; a surface that faces the lamp at distance d receives intensity / d^2.
+        Linear RGB radiant intensity; a surface that faces the lamp at distance d has the
+        irradiance intensity / d^2.
     """
 
     centre: NDArray[np.float64]
@@ -53,16 +54,16 @@ class Lamps:
 
 @dataclass(frozen=True)
 class Panes:
-    """P glowing rectangles.
+    """P rectangular light sources.
 
     Attributes
     ----------
     corner, side_a, side_b : (P, 3) float64
         A corner and the two edges from it, metres.
     normal : (P, 3) float64
-        Points into the room.
+        Unit vector into the room.
     radiance : (P, 3) float64
-        Linear RGB, the same in all directions.
+        Linear RGB, equal in all directions.
     """
 
     corner: NDArray[np.float64]
@@ -72,16 +73,31 @@ class Panes:
     radiance: NDArray[np.float64]
 
 
-def light_of(plan: FloorPlan, part: str, look: int) -> Light:
-    """Draw an apartment's light from the pool of its part."""
-    pool = LIGHT[part]
-    rng = draw("light", part, plan.name, look)
-    lamp, sky = pool[int(rng.random() * len(pool))]
+def light_of(plan: FloorPlan, part: str, appearance_seed: int) -> Light:
+    """Draw an apartment's light from an appearance palette.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+    part : {"train", "validation", "test"}
+        Split part, which selects the appearance palette.
+    appearance_seed : int
+        Seed of the random choice within the palette.
+    """
+    palette = LIGHT[part]
+    rng = draw("light", part, plan.name, appearance_seed)
+    lamp, sky = palette[int(rng.random() * len(palette))]
     return Light(np.array(lamp), np.array(sky))
 
 
 def lamps_and_panes(plan: FloorPlan, light: Light) -> tuple[Lamps, Panes]:
-    """The sources of light of a plan: a lamp is as strong as its room is large."""
+    """Compute the light sources of a plan; a lamp's intensity is proportional to its room's area.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+    light : Light
+    """
     areas = []
     for lamp in plan.lamps:
         inside = [r for r in plan.rooms if r.x0 <= lamp.x <= r.x1 and r.y0 <= lamp.y <= r.y1]
@@ -101,7 +117,7 @@ def lamps_and_panes(plan: FloorPlan, light: Light) -> tuple[Lamps, Panes]:
 
 
 def inward(window: Window, plan: FloorPlan) -> NDArray[np.float64]:
-    """The unit vector from a window into its room."""
+    """Compute the unit vector from a window into its room."""
     axis = 1 if window.along == "x" else 0
     step = np.zeros(3)
     step[axis] = 1.0

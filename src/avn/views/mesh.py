@@ -1,4 +1,4 @@
-"""Textured triangles: what a view shows."""
+"""Textured triangle meshes: concatenation, selection, subdivision, boxes."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class Mesh:
     Attributes
     ----------
     vertices : (T, 3, 3) float32
-        Corners in metres, x east, y north, z up.
+        Metres, x east, y north, z up.
     uv : (T, 3, 2) float32
-        Texture coordinates of the corners; textures repeat, v grows upward in the picture.
+        Texture coordinates of the vertices. Textures repeat; v points up in the image.
     texture : (T,) int32
         Index into `textures`; -1 for plain colour.
     colour : (T, 3) float32
-        Linear RGB albedo, 0 to 1; it multiplies the texture.
+        Linear RGB albedo, 0 to 1, which multiplies the texture.
     textures : tuple of (h, w, 3) uint8
-        sRGB pictures, row 0 at the top.
+        sRGB, row 0 at the top.
     piece : (T,) int32
         Index into `plan.furniture`; -1 for the building.
     """
@@ -39,11 +39,12 @@ class Mesh:
     piece: NDArray[np.int32]
 
     def __len__(self) -> int:
+        """Return the number of triangles."""
         return len(self.vertices)
 
 
 def join(meshes: Sequence[Mesh]) -> Mesh:
-    """All triangles of some meshes, in their order."""
+    """Concatenate meshes."""
     starts = np.cumsum([0] + [len(mesh.textures) for mesh in meshes])
     texture = [
         np.where(mesh.texture < 0, -1, mesh.texture + start).astype(np.int32)
@@ -60,7 +61,7 @@ def join(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def take(mesh: Mesh, index: NDArray[np.int64] | NDArray[np.bool_]) -> Mesh:
-    """Some of a mesh's triangles, all of its textures."""
+    """Select triangles of a mesh; all its textures are kept."""
     return Mesh(
         vertices=mesh.vertices[index],
         uv=mesh.uv[index],
@@ -72,7 +73,7 @@ def take(mesh: Mesh, index: NDArray[np.int64] | NDArray[np.bool_]) -> Mesh:
 
 
 def split(mesh: Mesh, longest: float) -> tuple[Mesh, NDArray[np.int64]]:
-    """Halve triangles at their longest edge until no edge is longer than asked for.
+    """Bisect triangles at their longest edge until no edge exceeds a length.
 
     Parameters
     ----------
@@ -83,9 +84,9 @@ def split(mesh: Mesh, longest: float) -> tuple[Mesh, NDArray[np.int64]]:
     Returns
     -------
     Mesh
-        The same surface.
+        N triangles of the same surface.
     (N,) int64
-        Which triangle of `mesh` each came from.
+        Index of the triangle of `mesh` that each is part of.
     """
     vertices, uv = mesh.vertices, mesh.uv
     parent = np.arange(len(vertices))
@@ -94,7 +95,7 @@ def split(mesh: Mesh, longest: float) -> tuple[Mesh, NDArray[np.int64]]:
         long = edges.max(axis=1) > longest
         if not long.any():
             break
-        # corner 0 and 1 become the ends of the longest edge
+        # rotate vertices 0 and 1 to the ends of the longest edge
         turn = edges[long].round(5).argmax(axis=1)[:, None]
         order = (np.arange(3) + turn) % 3
         rows = np.arange(len(order))[:, None]
@@ -120,15 +121,16 @@ def boxes(
     colour: NDArray[np.float32],
     piece: NDArray[np.int32],
 ) -> Mesh:
-    """Plain boxes, twelve triangles each.
+    """Build untextured axis-aligned boxes of twelve triangles each.
 
     Parameters
     ----------
     lower, upper : (B, 3) float64
-        Corners, metres.
+        Opposite corners in metres.
     colour : (B, 3) float32
-        Linear albedo.
+        Linear RGB albedo.
     piece : (B,) int32
+        Index into `plan.furniture`; -1 for the building.
     """
     faces = []
     for axis in range(3):

@@ -1,7 +1,7 @@
 """Furniture of a floor plan as textured triangles.
 
-Grid and acoustics have a piece as its box, so each model is scaled to that box exactly: nothing
-leaves it, and seen from above it fills at least 80 % of it.
+Grid and acoustics represent a piece by its bounding box. Each model is scaled to exactly that
+box, and seen from above it covers at least 80 % of it.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from avn.views.mesh import Mesh, boxes, join
 
 __all__ = ["Mesh", "assets_hash", "choose", "furniture_mesh"]
 
-# Models whose distortion is at most this much over the best one's are as good as that one.
+# A model is eligible if its distortion exceeds the least one by at most this.
 _NEARLY = 0.35
-# Plain boxes for kinds of piece that no model stands for: linear albedo by material.
+# Linear RGB albedo of the plain boxes of pieces without a model, by material.
 _PLAIN = {
     "wood": (0.36, 0.22, 0.12),
     "laminate": (0.62, 0.60, 0.56),
@@ -35,37 +35,52 @@ _PLAIN = {
 _UNKNOWN = (0.5, 0.5, 0.5)
 
 
-def furniture_mesh(plan: FloorPlan, part: str, look: int = 0) -> Mesh:
-    """Triangles of all pieces of a plan, to be seen from both sides.
+def furniture_mesh(plan: FloorPlan, part: str, appearance_seed: int = 0) -> Mesh:
+    """Build the two-sided triangles of all furniture of a plan.
 
     Parameters
     ----------
     plan : FloorPlan
-    part : str
-        `train`, `validation` or `test`: the pool of models that the apartment draws from. Pools
-        share neither models nor pictures.
-    look : int
-        Another number is another choice of models from the same pool.
+    part : {"train", "validation", "test"}
+        Split part, which selects the models. Parts share neither models nor textures.
+    appearance_seed : int
+        Seed of the choice of models.
 
     Returns
     -------
     Mesh
-        Each piece's triangles reach to all six faces of its box and no further. A kind of piece
-        that no model stands for is a plain box in the colour of its material.
+        The bounds of a piece's triangles are those of its bounding box. A piece without a model
+        is a plain box in the colour of its material.
     """
-    meshes = [_placed(plan, index, part, look) for index in range(len(plan.furniture))]
+    meshes = [_placed(plan, index, part, appearance_seed) for index in range(len(plan.furniture))]
     if not meshes:
         none = np.zeros((0, 3))
         return boxes(none, none, none.astype(np.float32), np.zeros(0, dtype=np.int32))
     return _sharing_pictures(join(meshes))
 
 
-def choose(plan: FloorPlan, index: int, part: str, look: int = 0) -> FurnitureModel | None:
-    """The model that stands for a piece; None if there is none for its kind.
+def choose(
+    plan: FloorPlan, index: int, part: str, appearance_seed: int = 0
+) -> FurnitureModel | None:
+    """Choose the model of a piece among those that are least distorted by scaling to its box.
 
-    Among the pool's models of the kind, one of those that are least distorted when they are
-    scaled to the piece. Which one depends on the apartment, the room, the kind and the size:
-    equal pieces of one room, such as the chairs round a table, are alike.
+    The choice is seeded by apartment, room, kind and size, so that equal pieces of one room, such
+    as the chairs around a table, look the same.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+    index : int
+        Index into `plan.furniture`.
+    part : {"train", "validation", "test"}
+        Split part, which selects the models.
+    appearance_seed : int
+        Seed of the choice.
+
+    Returns
+    -------
+    FurnitureModel or None
+        None if no model represents this kind of piece.
     """
     piece = plan.furniture[index]
     fits = [model for model in catalogue() if piece.kind in model.kinds and model.pool == part]
@@ -74,14 +89,21 @@ def choose(plan: FloorPlan, index: int, part: str, look: int = 0) -> FurnitureMo
     costs = [distortion(model, piece) for model in fits]
     near = [model for model, cost in zip(fits, costs, strict=True) if cost <= min(costs) + _NEARLY]
     size = (piece.width, piece.depth, piece.height)
-    names = (plan.name, part, look, _room(plan, piece), piece.kind, *(f"{x:.3f}" for x in size))
+    names = (
+        plan.name,
+        part,
+        appearance_seed,
+        _room(plan, piece),
+        piece.kind,
+        *(f"{x:.3f}" for x in size),
+    )
     text = "\x1f".join(str(name) for name in names)
     draw = int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
     return near[draw % len(near)]
 
 
 def distortion(model: FurnitureModel, piece: Piece) -> float:
-    """How unevenly a model is scaled to fill a piece: log of the largest to the least factor."""
+    """Compute the distortion of a model scaled to a piece: log ratio of extreme scale factors."""
     width, depth, height = model.size
     wide = copies(model, piece) * width
     factors = (piece.width / wide, piece.depth / depth, piece.height / height)
@@ -89,7 +111,7 @@ def distortion(model: FurnitureModel, piece: Piece) -> float:
 
 
 def copies(model: FurnitureModel, piece: Piece) -> int:
-    """How many of a model stand side by side in a piece."""
+    """Compute the number of copies of a model that stand side by side in a piece."""
     if not model.row:
         return 1
     width, depth, height = model.size
@@ -104,12 +126,12 @@ def _room(plan: FloorPlan, piece: Piece) -> int:
     return -1
 
 
-def _placed(plan: FloorPlan, index: int, part: str, look: int) -> Mesh:
+def _placed(plan: FloorPlan, index: int, part: str, appearance_seed: int) -> Mesh:
     piece = plan.furniture[index]
     x0, y0, x1, y1 = piece.bounds
     lower = np.array([x0, y0, piece.z])
     upper = np.array([x1, y1, piece.z + piece.height])
-    model = choose(plan, index, part, look)
+    model = choose(plan, index, part, appearance_seed)
     if model is None:
         colour = np.array([_PLAIN.get(piece.material, _UNKNOWN)], dtype=np.float32)
         return boxes(lower[None], upper[None], colour, np.array([index], dtype=np.int32))
@@ -128,27 +150,27 @@ def _placed(plan: FloorPlan, index: int, part: str, look: int) -> Mesh:
 
 
 def _shifted(unit: NDArray[np.float32], place: int, count: int) -> NDArray[np.float64]:
-    """The model at a place of a row from left to right."""
+    """Scale and shift a model to its place in a row of copies, from left to right."""
     shifted = unit.astype(np.float64)
     shifted[..., 0] = (shifted[..., 0] + place) / count
     return shifted
 
 
 def _turned(unit: NDArray[np.float64], heading: int) -> NDArray[np.float64]:
-    """From the piece's frame (u, v, w) to east, north and up within its box, each 0 to 1."""
+    """Rotate from a piece's frame (u, v, w) to east, north and up in its box, each 0 to 1."""
     u, v, w = np.moveaxis(unit, -1, 0)
-    # East and north of a piece that faces north, east, south, west.
+    # (east, north) for pieces that face north, east, south, west
     east, north = ((u, v), (v, 1 - u), (1 - u, 1 - v), (1 - v, u))[heading % 4]
     return np.stack((east, north, w), axis=-1)
 
 
 def _sharing_pictures(mesh: Mesh) -> Mesh:
-    """The same mesh with each picture held once."""
+    """Merge identical textures of a mesh."""
     first: dict[int, int] = {}
     pictures: list[NDArray[np.uint8]] = []
     renamed = np.full(len(mesh.textures) + 1, -1, dtype=np.int32)
     for index, picture in enumerate(mesh.textures):
-        # `load_model` gives the same array to all pieces that share a model.
+        # `load_model` returns the same array for all pieces with the same model.
         if id(picture) not in first:
             first[id(picture)] = len(pictures)
             pictures.append(picture)

@@ -1,7 +1,7 @@
-"""Wavefront OBJ files with their materials, as triangles.
+"""Reader of Wavefront OBJ files with materials, as triangles.
 
-What a model of furniture needs of the format, and no more: polygons with texture coordinates
-(`v`, `vt`, `f`), plain colours (`Kd`), transparency (`d`, `Tr`) and images (`map_Kd`).
+The supported part of the format is polygons with texture coordinates (`v`, `vt`, `f`), plain
+colours (`Kd`), transparency (`d`, `Tr`) and images (`map_Kd`).
 """
 
 from __future__ import annotations
@@ -13,14 +13,25 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-# Glass is made opaque in this linear colour, a pale blue-green.
+# Opaque linear RGB colour that replaces glass, a pale blue-green.
 GLASS = (0.62, 0.72, 0.72)
+# Largest opacity of a clear material.
 _CLEAR = 0.5
 
 
 @dataclass(frozen=True)
 class Material:
-    """A material of an MTL file: linear RGB, opacity 0..1, and the image's path if it has one."""
+    """Material of an MTL file.
+
+    Attributes
+    ----------
+    colour : tuple of float
+        Linear RGB.
+    opacity : float
+        0 to 1.
+    image : Path, optional
+        Texture.
+    """
 
     colour: tuple[float, float, float] = (0.6, 0.6, 0.6)
     opacity: float = 1.0
@@ -28,20 +39,20 @@ class Material:
 
     @property
     def clear(self) -> bool:
-        """Whether one sees more through it than of it."""
+        """True if the opacity is below 0.5."""
         return self.opacity < _CLEAR
 
 
 @dataclass(frozen=True)
 class ObjModel:
-    """T triangles as the file has them.
+    """T triangles of an OBJ file.
 
     Attributes
     ----------
     vertices : (T, 3, 3) float64
-        In the file's own units and axes.
+        Units and axes of the file.
     uv : (T, 3, 2) float64
-        Texture coordinates, v up; zero where the file has none.
+        Texture coordinates, v up; 0 if the file has none.
     material : (T,) int32
         Index into `materials`.
     materials : tuple of Material
@@ -56,16 +67,16 @@ class ObjModel:
 def read_obj(path: Path) -> ObjModel:
     """Read an OBJ file and the MTL files that it names.
 
-    Triangles without area are left out: they have no normal. Indices may count from the end, as
-    the format allows. A material that no file defines is plain grey, an image that is not there
-    leaves its plain colour.
+    Triangles without area are dropped, since they have no normal. Negative indices count from
+    the end. An undefined material is plain grey. A material whose image is missing keeps its
+    plain colour.
     """
     points: list[list[float]] = []
     coordinates: list[list[float]] = []
     library: dict[str, Material] = {}
     names: dict[str, int] = {"": 0}
     corners: list[tuple[int, int]] = []
-    polygons: list[tuple[int, int, int]] = []  # first corner, how many, material
+    polygons: list[tuple[int, int, int]] = []  # first corner, number of corners, material
     current = 0
     for line in path.read_text(encoding="latin-1").splitlines():
         key, rest = _words(line)
@@ -82,7 +93,7 @@ def read_obj(path: Path) -> ObjModel:
             polygons.append((len(corners), len(own), current))
             corners.extend(own)
     at = np.array(points, dtype=np.float64).reshape(-1, 3)
-    # The last row is what a corner without texture coordinates (index -1) finds.
+    # The last row is for corners without texture coordinates, whose index is -1.
     uv = np.array([*coordinates, [0.0, 0.0]], dtype=np.float64)
     fan: list[tuple[int, int, int]] = []
     material: list[int] = []
@@ -105,7 +116,7 @@ def read_obj(path: Path) -> ObjModel:
 
 
 def _words(line: str) -> tuple[str, str]:
-    """The key of a line and all that follows it."""
+    """Split a line into its key and the rest."""
     key, *rest = line.split(None, 1) or [""]
     return key, rest[0].strip() if rest else ""
 
@@ -119,21 +130,27 @@ def _corner(word: str, points: int, coordinates: int) -> tuple[int, int]:
 
 
 def triangulate(ring: NDArray[np.float64]) -> list[tuple[int, int, int]]:
-    """Cut a polygon into triangles of its corners' numbers.
+    """Triangulate a polygon.
 
-    A fan where the polygon is convex; else ears are clipped (Meisters, "Polygons have ears",
-    American Mathematical Monthly 1975) in the plane of the polygon.
+    A convex polygon becomes a fan. For others ears are clipped in the plane of the polygon
+    (Meisters, "Polygons have ears", American Mathematical Monthly 1975).
 
     Parameters
     ----------
     ring : (N, 3) float64
+        Vertices in order.
+
+    Returns
+    -------
+    list of (int, int, int)
+        Vertex indices of the triangles.
     """
     count = len(ring)
     if count < 3:
         return []
     if count == 3:
         return [(0, 1, 2)]
-    # Newell's normal: twice the area of the polygon, whatever its corners do.
+    # Newell's method: a normal of twice the polygon's area, also if it is not planar.
     normal = np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
     sides = np.roll(ring, -1, axis=0) - ring
     turns = np.cross(sides, np.roll(sides, -1, axis=0)) @ normal
@@ -141,7 +158,7 @@ def triangulate(ring: NDArray[np.float64]) -> list[tuple[int, int, int]]:
         return [(0, i, i + 1) for i in range(1, count - 1)]
     drop = int(np.argmax(abs(normal)))
     flat = np.delete(ring, drop, axis=1)
-    # Seen from the side from which the corners run anticlockwise.
+    # Mirror if needed, so that the vertices run counter-clockwise.
     if (normal[drop] < 0) != (drop == 1):
         flat[:, 0] *= -1.0
     return _clip_ears(flat)
@@ -159,7 +176,7 @@ def _clip_ears(flat: NDArray[np.float64]) -> list[tuple[int, int, int]]:
                 left.pop(place)
                 break
         else:
-            # Sides that cross or corners that coincide: what is left becomes a fan.
+            # Sides cross or vertices coincide: the rest becomes a fan.
             break
     return ears + [(left[0], left[i], left[i + 1]) for i in range(1, len(left) - 1)]
 
@@ -178,9 +195,9 @@ def _inside(points: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArra
 
 
 def read_mtl(path: Path) -> dict[str, Material]:
-    """Read the materials of an MTL file by name; none where the file is not there.
+    """Read the materials of an MTL file by name; empty if the file is missing.
 
-    `Kd` is taken as sRGB, as the viewers that such files are made for show it.
+    `Kd` is interpreted as sRGB, as most viewers do.
     """
     found: dict[str, Material] = {}
     if not path.is_file():
@@ -210,7 +227,7 @@ def _changed(material: Material, **values: object) -> Material:
 
 
 def _image(folder: Path, words: str) -> Path | None:
-    """The image that `map_Kd` names, options before it or not, if Pillow can open it."""
+    """Find the image that `map_Kd` names, with or without options, if Pillow can open it."""
     for name in (words, words.split()[-1]):
         path = folder / name.replace("\\", "/")
         if path.is_file():
@@ -224,6 +241,6 @@ def _image(folder: Path, words: str) -> Path | None:
 
 
 def to_linear(value: float) -> float:
-    """The linear value of an sRGB value, both 0..1 (IEC 61966-2-1)."""
+    """Convert an sRGB value to linear, both 0 to 1 (IEC 61966-2-1)."""
     value = min(max(value, 0.0), 1.0)
     return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4

@@ -1,4 +1,4 @@
-"""`renderer=raycast`: rays through Embree, light baked once an apartment."""
+"""`renderer=raycast`: ray casting with Embree, and light baked once per apartment."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.views import shading
-from avn.views.eye import Eye
 from avn.views.light_points import choose_points, normals_of
 from avn.views.lighting import LightConfig, bake
 from avn.views.mesh import BUILDING, split
+from avn.views.ray_camera import RayCamera
 from avn.views.rays import Triangles
 from avn.views.renderer import Prepared, Renderer, RendererConfig, check_light, check_range
-from avn.views.scenery import scenery
+from avn.views.scene_mesh import scene_mesh
 
-# Levels of a picture that are skipped where only its colour near a triangle counts.
+# Pyramid level of a texture from which the albedo of a triangle is sampled.
 _COARSE = 4
-# Brightness that what is seen is exposed to, on average over the eye's scale.
+# Log-average luminance to which images are exposed.
 _KEY = 0.42
 
 
@@ -33,6 +33,7 @@ class RaycastConfig(RendererConfig):
     samples : int
         Rays along each side of a pixel.
     light : LightConfig
+        Settings of the baked light.
     """
 
     _target_: str = "avn.views.raycast.Raycast"
@@ -42,22 +43,25 @@ class RaycastConfig(RendererConfig):
 
 
 class Raycast(Renderer):
-    """Views by ray casting; see `Renderer`."""
+    """Renderer that casts rays and looks up baked irradiance.
+
+    See `Renderer` for the parameters.
+    """
 
     def __init__(
         self,
         cfg: RaycastConfig,
         plan: FloorPlan,
         part: str,
-        look: int = 0,
+        appearance_seed: int = 0,
         prepared: Prepared | None = None,
     ) -> None:
         self.cfg = cfg
-        self.scenery = scenery(plan, part, look)
-        # the diagonal of a cell of the grid that light is baked on
-        self.mesh, origin = split(self.scenery.mesh, cfg.light.spacing * math.sqrt(2))
-        self.glow = np.ascontiguousarray(self.scenery.glow[origin])
-        self.shade = self.scenery.shade[origin]
+        self.scene = scene_mesh(plan, part, appearance_seed)
+        # longest edge: the diagonal of a cell of the grid that light is baked on
+        self.mesh, origin = split(self.scene.mesh, cfg.light.spacing * math.sqrt(2))
+        self.emission = np.ascontiguousarray(self.scene.emission[origin])
+        self.occluder = self.scene.occluder[origin]
         self.normal, self.area = normals_of(self.mesh.vertices)
         self.pyramids = shading.pyramids(self.mesh.textures)
         self._prepared = prepared
@@ -69,7 +73,7 @@ class Raycast(Renderer):
             shading.LINEAR,
         )
         self._density = self._texel_density()
-        self._eye = Eye(cfg.camera, Triangles(self.mesh.vertices), cfg.samples)
+        self._camera = RayCamera(cfg.camera, Triangles(self.mesh.vertices), cfg.samples)
 
     @classmethod
     def check(cls, cfg: RendererConfig) -> None:
@@ -80,7 +84,7 @@ class Raycast(Renderer):
         check_light(cfg.light)
 
     def _texel_density(self) -> NDArray[np.float32]:
-        """Pixels of its picture for each metre of a triangle, (T,)."""
+        """Compute the texels per metre of each triangle, (T,)."""
         uv = self.mesh.uv.astype(np.float64)
         a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
         covered = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
@@ -93,7 +97,7 @@ class Raycast(Renderer):
         return density
 
     def albedo(self) -> NDArray[np.float32]:
-        """Linear colour of each triangle about its middle, (T, 3)."""
+        """Compute the linear RGB albedo of each triangle near its centre, (T, 3)."""
         middle = np.ascontiguousarray(self.mesh.uv.mean(axis=1))
         found: NDArray[np.float32] = shading.sample(
             middle, self.mesh.texture, self.mesh.colour, _COARSE, *self._lookup
@@ -101,16 +105,22 @@ class Raycast(Renderer):
         return found
 
     def prepare(self) -> Prepared:
-        """Irradiance at all corners, whose corners they are, and the exposure that suits it."""
+        """Bake the irradiance at all vertices, and compute the exposure.
+
+        Returns
+        -------
+        dict of arrays
+            `light`, as `bake` returns it; `corner`, see `Points`; `exposure`, a scalar.
+        """
         if self._prepared is None:
             albedo = self.albedo()
             points = choose_points(self.mesh, self.cfg.light.spacing)
             light = bake(
                 self.mesh,
                 albedo,
-                self.shade,
-                self.scenery.lamps,
-                self.scenery.panes,
+                self.occluder,
+                self.scene.lamps,
+                self.scene.panes,
                 self.cfg.light,
                 points,
             )
@@ -123,8 +133,12 @@ class Raycast(Renderer):
         return self._prepared
 
     def _exposure(self, albedo: NDArray[np.float32], light: NDArray[np.float32]) -> float:
-        """What brings the building, its corners lit with (T, 3, 3), to a middling brightness."""
-        own = (self.mesh.piece == BUILDING) & (self.glow.max(axis=1) == 0)
+        """Compute the exposure that brings the building's log-average luminance to `_KEY`.
+
+        Reinhard et al., "Photographic tone reproduction for digital images", SIGGRAPH 2002,
+        equations 1 and 2. `light` is the irradiance at the corners of each triangle, (T, 3, 3).
+        """
+        own = (self.mesh.piece == BUILDING) & (self.emission.max(axis=1) == 0)
         irradiance = light[own].mean(axis=1)
         bright = (albedo[own] * irradiance / np.pi) @ np.array((0.2126, 0.7152, 0.0722))
         logs = np.log(np.maximum(bright, 1e-4))
@@ -139,26 +153,26 @@ class Raycast(Renderer):
         rgb = np.empty((len(centres), size, size, 3), dtype=np.uint8)
         depth = np.empty((len(centres), size, size), dtype=np.float16)
         for n, (centre, heading) in enumerate(zip(centres, headings, strict=True)):
-            hits = self._eye.look(centre, heading)
+            hits = self._camera.cast(centre, heading)
             seen = shading.shade(
                 hits.triangle,
                 hits.u,
                 hits.v,
                 hits.distance,
-                self._eye.rays[heading],
+                self._camera.rays[heading],
                 self.cfg.samples**2,
-                self._eye.pixel,
+                self._camera.pixel,
                 self.normal,
                 self._density,
                 self.mesh.uv,
                 self.mesh.texture,
                 self.mesh.colour,
-                self.glow,
+                self.emission,
                 prepared["corner"],
                 prepared["light"],
                 *self._lookup,
                 float(prepared["exposure"]),
             )
             rgb[n] = shading.encode(seen).reshape(size, size, 3)
-            depth[n] = self._eye.depth(centre, heading)
+            depth[n] = self._camera.depth(centre, heading)
         return rgb, depth

@@ -1,4 +1,4 @@
-"""Embree's side of it: triangles that rays can be cast at."""
+"""Ray casting with Embree: nearest hits and occlusion tests against triangles."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Hits:
-    """What N rays met.
+    """First hits of N rays.
 
     Attributes
     ----------
     triangle : (N,) int32
-        -1 where a ray met nothing.
+        Index of the triangle; -1 for no hit.
     u, v : (N,) float32
-        Weights of the triangle's second and third corner.
+        Barycentric coordinates: weights of the triangle's second and third vertex.
     distance : (N,) float32
-        Metres.
+        Distance along the ray in metres.
     """
 
     triangle: NDArray[np.int32]
@@ -31,32 +31,54 @@ class Hits:
 
 
 class Triangles:
-    """Triangles (T, 3, 3), in metres, to cast rays at."""
+    """Acceleration structure of triangles for ray queries.
+
+    Parameters
+    ----------
+    vertices : (T, 3, 3) float32
+        Metres.
+    """
 
     def __init__(self, vertices: NDArray[np.float32]) -> None:
-        self._scene = EmbreeScene(robust=True)  # or rays slip through edges that meet
+        self._scene = EmbreeScene(robust=True)  # else rays slip through shared edges
         self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(vertices, dtype=np.float32))
 
-    def meet(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> Hits:
-        """The nearest triangle along each ray.
+    def intersect(self, origins: NDArray[np.float32], directions: NDArray[np.float32]) -> Hits:
+        """Find the nearest triangle along each ray.
 
         Parameters
         ----------
         origins : (N, 3) float32
+            Metres.
         directions : (N, 3) float32
             Unit vectors.
         """
         found = self._scene.run(origins, directions, output=1)
         return Hits(found["primID"], found["u"], found["v"], found["tfar"])
 
-    def blocked(
+    def occluded(
         self,
         origins: NDArray[np.float32],
         directions: NDArray[np.float32],
         distances: NDArray[np.float32],
     ) -> NDArray[np.bool_]:
-        """Whether anything lies nearer than `distances` (N,) along each ray."""
-        blocked: NDArray[np.bool_] = (
+        """Test for occlusion along each ray.
+
+        Parameters
+        ----------
+        origins : (N, 3) float32
+            Metres.
+        directions : (N, 3) float32
+            Unit vectors.
+        distances : (N,) float32
+            Length of each ray in metres.
+
+        Returns
+        -------
+        (N,) bool
+            True if a triangle is nearer than the ray's length.
+        """
+        occluded: NDArray[np.bool_] = (
             self._scene.run(origins, directions, distances, query="OCCLUDED") >= 0
         )
-        return blocked
+        return occluded

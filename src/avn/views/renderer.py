@@ -1,4 +1,4 @@
-"""What every renderer is: it lights an apartment once, and then makes views of its states."""
+"""Interface of renderers: prepare an apartment's light once, then render views of its states."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ Prepared = dict[str, NDArray]
 
 @dataclass
 class RendererConfig:
-    """The config group `renderer`: what they all have.
+    """The config group `renderer`: settings of all renderers.
 
     Attributes
     ----------
     name : str
-        Names the file of the views.
+        Part of the name of the file of views.
     camera : CameraConfig
+        The agent's camera.
     """
 
     _target_: str = ""
@@ -34,18 +35,18 @@ class RendererConfig:
 
 
 class Renderer(ABC):
-    """Makes the views of one apartment.
+    """Base class of renderers of the views of one apartment.
 
     Parameters
     ----------
     cfg : RendererConfig
     plan : FloorPlan
     part : {"train", "validation", "test"}
-        The pool of models, patterns and light.
-    look : int
-        Which draw from the pool.
+        Split part, which selects furniture models and appearance palette.
+    appearance_seed : int
+        Seed of the random choices among them.
     prepared : dict of arrays, optional
-        What `prepare` gave, to save doing it again.
+        Result of an earlier `prepare`, which is then not repeated.
     """
 
     @abstractmethod
@@ -54,15 +55,15 @@ class Renderer(ABC):
         cfg: RendererConfig,
         plan: FloorPlan,
         part: str,
-        look: int = 0,
+        appearance_seed: int = 0,
         prepared: Prepared | None = None,
     ) -> None: ...
 
     @classmethod
     def check(cls, cfg: RendererConfig) -> None:
-        """Raise `UserError` for a value that makes no sense, or where something is not installed.
+        """Validate the settings and the installation; raise `UserError` if either is unusable.
 
-        A renderer with settings of its own looks at them too.
+        A subclass with settings of its own extends this method.
         """
         check_range("camera.size", cfg.camera.size, 1, 4096)
         check_range("camera.height", cfg.camera.height, 0.05, CEILING - 0.05)
@@ -71,37 +72,47 @@ class Renderer(ABC):
 
     @abstractmethod
     def prepare(self) -> Prepared:
-        """What is worked out once an apartment, such as its light."""
+        """Compute the data that all views of the apartment share, such as its baked light."""
 
     @abstractmethod
     def views(
         self, centres: NDArray[np.float64], headings: NDArray[np.int64]
     ) -> tuple[NDArray[np.uint8], NDArray[np.float16]]:
-        """Pictures from some places.
+        """Render RGB and depth images.
 
         Parameters
         ----------
         centres : (N, 2) float64
-            Where the camera stands, metres.
+            Camera positions (x, y) in metres.
         headings : (N,) int64
+            0 north, 1 east, 2 south, 3 west.
 
         Returns
         -------
         (N, size, size, 3) uint8
             sRGB, row 0 at the top.
         (N, size, size) float16
-            Metres along the camera's axis to what the middle of the pixel shows; 0 for nothing.
+            Depth at the pixel centre in metres along the optical axis; 0 for no hit.
         """
 
 
 def check_range(key: str, value: float, low: float, high: float) -> None:
-    """Raise `UserError` where a setting of the renderer is out of bounds."""
+    """Raise `UserError` if a setting of the renderer is out of bounds.
+
+    Parameters
+    ----------
+    key : str
+        Config key below `renderer`.
+    value : float
+    low, high : float
+        Inclusive bounds.
+    """
     if not low <= value <= high:
         raise UserError(f"renderer.{key}: {value}; give {low:g} to {high:g}")
 
 
 def check_light(cfg: LightConfig) -> None:
-    """Raise `UserError` where light cannot be baked so."""
+    """Raise `UserError` if a setting of the baked light is out of bounds."""
     check_range("light.spacing", cfg.spacing, 0.02, 1.0)
     check_range("light.shadow_rays", cfg.shadow_rays, 1, 4096)
     check_range("light.gather_rays", cfg.gather_rays, 1, 4096)
@@ -110,6 +121,6 @@ def check_light(cfg: LightConfig) -> None:
 
 
 def renderer_class(cfg: RendererConfig) -> type[Renderer]:
-    """The class that `_target_` names; raises `UserError` where there is none."""
+    """Import the class that `_target_` names; raise `UserError` if there is none."""
     found: type[Renderer] = import_class("renderer._target_", cfg._target_)
     return found

@@ -1,4 +1,4 @@
-"""`backbone=resnet18` and `resnet50`: ImageNet ResNets, where their weights can be had."""
+"""`backbone=resnet18` and `backbone=resnet50`: ImageNet ResNets, if weights are available."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from avn.core.errors import UserError
 from avn.core.hashing import digest, file_hash
 from avn.views.backbone import Backbone, BackboneConfig, first_line
 
-# Means and standard deviations of ImageNet's channels, 0 to 1, that its ResNets were trained with.
+# Channel means and standard deviations of the ResNets' training images, 0 to 1.
 _MEAN, _STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-# Seconds that the hub has to answer before it counts as out of reach.
+# Timeout in seconds of the connection to the hub.
 _PATIENCE = 5.0
-# Files of a folder that say what a ResNet computes.
+# Suffixes of the files that define a ResNet.
 _WEIGHTS = (".json", ".safetensors", ".bin")
 
 
 class ResNet(Backbone):
-    """A ResNet as transformers loads it, from the Hugging Face hub or a folder.
+    """ResNet pretrained on ImageNet, loaded by transformers from the hub or a folder.
 
-    512 features (18 layers) or 2048 (50). He et al., "Deep residual learning for image
-    recognition", CVPR 2016.
+    It has 512 features with 18 layers and 2048 with 50. He et al., "Deep residual learning for
+    image recognition", CVPR 2016.
     """
 
     def __init__(self, cfg: BackboneConfig) -> None:
@@ -46,7 +46,7 @@ class ResNet(Backbone):
 
     @classmethod
     def weights(cls, cfg: BackboneConfig) -> str:
-        """Hash of the files of a folder, or of the name on the hub."""
+        """Return a hash of the files of a folder, or of the name on the hub."""
         source = _source(cfg)
         if not Path(source).is_dir():
             return digest(source)
@@ -65,7 +65,7 @@ def _source(cfg: BackboneConfig) -> str:
             "backbone.source is not set; give the name of a ResNet on the Hugging Face hub, such "
             "as microsoft/resnet-18, or a folder"
         )
-    # What looks like a path and is none is not looked for on the hub.
+    # A source that looks like a path must be a folder; it is not requested from the hub.
     if cfg.source.startswith((".", "/", "~")) or cfg.source.count("/") > 1:
         path = Path(cfg.source).expanduser()
         if not path.is_dir():
@@ -78,10 +78,10 @@ def _source(cfg: BackboneConfig) -> str:
 
 
 def _from_pretrained(source: str, cfg: BackboneConfig) -> torch.nn.Module:
-    """The network, from a folder, from what the hub's client keeps, or from the hub."""
+    """Load the network from a folder, from the hub's local cache, or from the hub."""
     if (folder := Path(source)).is_dir() and not (folder / "config.json").is_file():
         raise _cannot_be_had(cfg, "the folder has no config.json")
-    # Here, for it takes seconds, and is not there unless it was asked for.
+    # Imported here because it takes seconds and is an optional dependency.
     transformers: Any = importlib.import_module("transformers")
     transformers.logging.set_verbosity_error()
     transformers.logging.disable_progress_bar()
@@ -93,7 +93,7 @@ def _from_pretrained(source: str, cfg: BackboneConfig) -> torch.nn.Module:
             if Path(source).is_dir() or not _hub_answers():
                 raise
             net, report = transformers.ResNetModel.from_pretrained(source, output_loading_info=True)
-    except Exception as error:  # damaged files show as almost any kind of exception
+    except Exception as error:  # damaged files raise almost any kind of exception
         raise _cannot_be_had(cfg, first_line(error)) from error
     if report["missing_keys"]:
         raise _cannot_be_had(cfg, f"{len(report['missing_keys'])} of its weights are missing")
@@ -111,7 +111,7 @@ def _cannot_be_had(cfg: BackboneConfig, why: str) -> UserError:
 
 
 def _hub_answers() -> bool:
-    """Whether the hub can be reached; its own client tries for half a minute before it says no."""
+    """Test if the hub is reachable; its own client takes half a minute to give up."""
     if os.environ.get("HTTPS_PROXY") or os.environ.get("https_proxy"):
         return True
     url = urlparse(os.environ.get("HF_ENDPOINT", "https://huggingface.co"))

@@ -1,4 +1,4 @@
-"""Textures and colours at what rays met: compiled loops over samples."""
+"""Compiled shading of ray hits: texture lookup, diffuse reflection, tone mapping."""
 
 from __future__ import annotations
 
@@ -15,14 +15,18 @@ LINEAR = to_linear(np.arange(256) / 255).astype(np.float32)
 
 @dataclass(frozen=True)
 class Pyramids:
-    """Pictures at full, half, quarter... size, so that far ones do not flicker.
+    """Image pyramids (mipmaps) of M textures with L levels.
+
+    Williams, "Pyramidal parametrics", SIGGRAPH 1983.
 
     Attributes
     ----------
     texels : (N, 3) uint8
-        sRGB, all pictures and levels one after the other.
-    start, height, width : (M, L) int64
-        Of picture m at level l; a picture that has fewer levels repeats its last.
+        sRGB texels of all textures and levels, concatenated.
+    start : (M, L) int64
+        First texel of texture m at level l. A texture with fewer levels repeats its last one.
+    height, width : (M, L) int64
+        Size in texels.
     """
 
     texels: NDArray[np.uint8]
@@ -32,7 +36,7 @@ class Pyramids:
 
 
 def pyramids(pictures: tuple[NDArray[np.uint8], ...]) -> Pyramids:
-    """Halve pictures in linear light until they are one pixel large."""
+    """Build the pyramids of sRGB images by averaging in linear light down to one pixel."""
     levels: list[list[NDArray[np.uint8]]] = []
     for picture in pictures:
         own = [np.ascontiguousarray(picture)]
@@ -78,7 +82,7 @@ def _texel(
     width: NDArray[np.int64],
     linear: NDArray[np.float32],
 ) -> None:
-    """Bilinear colour of picture m at (u, v), in linear light."""
+    """Interpolate texture m bilinearly at (u, v) in linear light."""
     h, w, first = height[m, level], width[m, level], start[m, level]
     x, y = u * w - 0.5, (1.0 - v) * h - 0.5
     x0, y0 = np.floor(x), np.floor(y)
@@ -105,7 +109,29 @@ def sample(
     width: NDArray[np.int64],
     linear: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Albedo (N, 3) at uv (N, 2) of triangles with a texture and a colour, at one level."""
+    """Sample the albedo of N triangles at one pyramid level.
+
+    Parameters
+    ----------
+    uv : (N, 2) float32
+        Texture coordinates.
+    texture : (N,) int32
+        Index of the texture; -1 for plain colour.
+    colour : (N, 3) float32
+        Linear RGB albedo, which multiplies the texture.
+    level : int
+        Pyramid level; 0 is full resolution.
+    texels : (K, 3) uint8
+    start, height, width : (M, L) int64
+        See `Pyramids`.
+    linear : (256,) float32
+        Linear value of each sRGB byte.
+
+    Returns
+    -------
+    (N, 3) float32
+        Linear RGB albedo.
+    """
     out = colour.copy()
     texel = np.empty(3, dtype=np.float32)
     for n in range(len(uv)):
@@ -131,7 +157,7 @@ def shade(
     uv: NDArray[np.float32],
     texture: NDArray[np.int32],
     colour: NDArray[np.float32],
-    glow: NDArray[np.float32],
+    emission: NDArray[np.float32],
     corner: NDArray[np.int32],
     light: NDArray[np.float32],
     texels: NDArray[np.uint8],
@@ -141,9 +167,53 @@ def shade(
     linear: NDArray[np.float32],
     exposure: float,
 ) -> NDArray[np.float32]:
-    """Displayed light (pixels, 3), 0 to 1 and linear: the mean of each pixel's samples.
+    """Shade the ray hits of an image and average them over each pixel.
 
-    Each sample goes through the film by itself, so that a bright one does not make an edge rough.
+    Surfaces are diffuse: reflected radiance is albedo times irradiance over pi. Samples are tone
+    mapped before they are averaged, which smooths edges of bright surfaces.
+
+    Parameters
+    ----------
+    triangle : (N,) int32
+        Triangle hit by each ray, pixel by pixel; -1 for no hit.
+    hit_u, hit_v : (N,) float32
+        Barycentric weights of the triangle's second and third vertex.
+    distance : (N,) float32
+        Metres.
+    rays : (N, 3) float32
+        Unit directions.
+    samples : int
+        Rays per pixel.
+    pixel : float
+        Width of a sample's part of the image plane at unit distance.
+    normal : (T, 3) float32
+        Unit normals.
+    density : (T,) float32
+        Texels per metre.
+    uv : (T, 3, 2) float32
+        Texture coordinates of the vertices.
+    texture : (T,) int32
+        Index of the texture; -1 for plain colour.
+    colour : (T, 3) float32
+        Linear RGB albedo, which multiplies the texture.
+    emission : (T, 3) float32
+        Linear RGB as exposed, multiplied by the texture.
+    corner : (T, 3) int32
+        Indices into `light`.
+    light : (2, V, 3) float32
+        Irradiance on front and back of each vertex, linear RGB.
+    texels : (K, 3) uint8
+    start, height, width : (M, L) int64
+        See `Pyramids`.
+    linear : (256,) float32
+        Linear value of each sRGB byte.
+    exposure : float
+        Factor on reflected radiance.
+
+    Returns
+    -------
+    (N / samples, 3) float32
+        Linear RGB after tone mapping, 0 to 1; 0 where no ray hits.
     """
     pixels = len(triangle) // samples
     out = np.zeros((pixels, 3), dtype=np.float32)
@@ -167,7 +237,7 @@ def shade(
             if m >= 0:
                 u = a * uv[t, 0, 0] + b * uv[t, 1, 0] + c * uv[t, 2, 0]
                 v = a * uv[t, 0, 1] + b * uv[t, 1, 1] + c * uv[t, 2, 1]
-                # the picture's pixels that a sample covers; seen aslant it covers more
+                # texels along the side of a sample's footprint, larger at grazing angles
                 covered = density[t] * pixel * distance[n] / np.sqrt(max(abs(facing), 0.15))
                 level = min(max(int(np.rint(np.log2(max(covered, 1e-3)))), 0), levels - 1)
                 _texel(texel, u, v, level, m, texels, start, height, width, linear)
@@ -175,7 +245,7 @@ def shade(
             for k in range(3):
                 irradiance = a * light[side, i, k] + b * light[side, j, k] + c * light[side, k3, k]
                 passed_on = colour[t, k] * irradiance / np.pi
-                out[p, k] += film(texel[k] * (passed_on * exposure + glow[t, k]))
+                out[p, k] += tone_map(texel[k] * (passed_on * exposure + emission[t, k]))
         if met:
             for k in range(3):
                 out[p, k] /= met
@@ -183,11 +253,11 @@ def shade(
 
 
 @numba.njit(cache=True)
-def film(x: float) -> float:
-    """Linear light to displayed light.
+def tone_map(x: float) -> float:
+    """Apply the tone curve to an exposed linear value.
 
-    The curve of E. Reinhard et al., "Photographic tone reproduction for digital images",
-    SIGGRAPH 2002, equation 4, whose white is at 4, after a little contrast.
+    Reinhard et al., "Photographic tone reproduction for digital images", SIGGRAPH 2002, equation
+    4 with white at 4, after a power of 1.2 that raises the contrast.
     """
     x = max(x, 0.0) ** 1.2
     return min(x * (1.0 + x / 16.0) / (1.0 + x), 1.0)
@@ -206,16 +276,16 @@ def _encode(light: NDArray[np.float32], steps: NDArray[np.uint8]) -> NDArray[np.
 
 
 def encode(light: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """SRGB bytes of displayed light 0 to 1, flat."""
+    """Convert linear values from 0 to 1 to sRGB bytes, flattened."""
     found: NDArray[np.uint8] = _encode(light, _STEPS)
     return found
 
 
 @numba.njit(cache=True)
-def develop(light: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What the film makes of exposed light of any shape, flat."""
+def tone_map_pixels(light: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Apply `tone_map` to every value of an exposed image, flattened."""
     flat = light.ravel()
     out = np.empty(len(flat), dtype=np.float32)
     for n in range(len(flat)):
-        out[n] = film(flat[n])
+        out[n] = tone_map(flat[n])
     return out

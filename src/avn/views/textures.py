@@ -1,7 +1,7 @@
-"""Procedural pictures of floors, walls, ceilings and of what is seen through windows.
+"""Procedural textures of floors, walls, ceilings and of the view through windows.
 
-Each part of a split draws from a pool of its own: colours and patterns of the three pools do not
-overlap, so that what a network learns in training apartments is put to the test by others.
+Each part of a split has an appearance palette of its own. Colours and patterns of the three
+palettes are disjoint, so evaluation apartments test the generalisation of trained networks.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from avn.views.appearance_palettes import COLOURS, LAYOUTS
 from avn.views.drawing import Image, bond, draw, herringbone, noise
-from avn.views.pools import COLOURS, LAYOUTS
 
-# Pixels along each side of a pattern: about 5 mm each on a floor.
+# Side of a pattern in pixels: about 5 mm each on a floor.
 PIXELS = 384
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """A picture that repeats.
+    """Repeating texture.
 
     Attributes
     ----------
     picture : (h, w, 3) uint8
         sRGB.
     width, height : float
-        Metres that one repeat covers.
+        Size of one repeat in metres.
     """
 
     picture: NDArray[np.uint8]
@@ -38,16 +38,16 @@ class Pattern:
 
 
 def pattern(material: str, part: str, *names: object) -> Pattern:
-    """The picture of a building material.
+    """Draw the texture of a building material.
 
     Parameters
     ----------
     material : str
-        A name known to `avn.acoustics.materials`.
+        Name of a material in `avn.acoustics.materials`.
     part : {"train", "validation", "test"}
-        Which pool it is drawn from.
+        Split part, which selects the appearance palette.
     *names : object
-        What it is drawn for: apartment, room, look.
+        Seed of the random choices: apartment, room, surface and appearance seed.
     """
     rng = draw("pattern", material, part, *names)
     paint = _PAINTERS.get(material, _plaster)
@@ -60,7 +60,7 @@ def _choose(rng: np.random.Generator, options: tuple) -> tuple:
 
 
 def _colour(rng: np.random.Generator, part: str, kind: str) -> NDArray[np.float64]:
-    """A colour of the pool, 0 to 1, a little off so that no two rooms are quite the same."""
+    """Draw an sRGB colour of the palette, 0 to 1, with jitter of up to 4 / 255."""
     base = np.array(_choose(rng, COLOURS[part][kind]), dtype=np.float64)
     return np.clip(base + rng.uniform(-4, 4, 3), 0, 255) / 255
 
@@ -70,7 +70,7 @@ def _finish(image: Image, width: float, height: float) -> Pattern:
 
 
 def _tones(rng: np.random.Generator, stones: NDArray[np.int64], spread: float) -> Image:
-    """A brightness for each stone."""
+    """Draw the relative brightness of each stone."""
     tones = 1 + spread * rng.uniform(-1, 1, int(stones.max()) + 1)
     return tones[stones][..., None]
 
@@ -188,9 +188,16 @@ _PAINTERS: dict[str, Callable[[np.random.Generator, str, str], Pattern]] = {
 
 
 def outdoors(part: str, *names: object) -> Pattern:
-    """What is seen through a window: sky, and trees or houses below it, out of focus.
+    """Draw the view through a window: sky above blurred trees or houses.
 
-    The picture stands for the whole of a pane; it does not repeat.
+    The texture covers a whole pane and does not repeat.
+
+    Parameters
+    ----------
+    part : {"train", "validation", "test"}
+        Split part, which selects the appearance palette.
+    *names : object
+        Seed of the random choices: apartment and appearance seed.
     """
     rng = draw("outdoors", part, *names)
     rows = np.linspace(0, 1, 128)[:, None, None]  # 0 at the top
@@ -204,7 +211,7 @@ def outdoors(part: str, *names: object) -> Pattern:
     if rng.random() < 0.5:  # roofs: flat steps
         line = 0.58 + 0.10 * rng.standard_normal(8).repeat(16)
     below = rows[..., 0] > line[None]
-    shade = 1 + 0.25 * noise(rng, (128, 128), 1.0)
-    image = np.where(below[..., None], ground * shade[..., None], image)
+    brightness = 1 + 0.25 * noise(rng, (128, 128), 1.0)
+    image = np.where(below[..., None], ground * brightness[..., None], image)
     image = gaussian_filter(image, (1.6, 1.6, 0), mode="nearest")
     return _finish(image, 1.0, 1.0)

@@ -8,7 +8,7 @@
   let views = null; // read when the first episode is opened
   let shown = null;
 
-  // A click or Enter on a heading sorts, on a cell or an episode opens it.
+  // A click or Enter sorts by a heading, and opens a cell or an episode.
   document.addEventListener("keydown", (event) => {
     if (event.key !== "Enter" && event.key !== " ") return;
     if (event.target.matches("th[tabindex], td[tabindex], tr[tabindex]")) {
@@ -31,13 +31,13 @@
   function list(cell) {
     document.querySelectorAll("td.chosen").forEach((other) => other.classList.remove("chosen"));
     cell.classList.add("chosen");
-    const { run, sound, room } = cell.dataset;
+    const { run, sound, scene } = cell.dataset;
     const own = data.runs[run];
     const rows = own.episodes.filter((row) =>
-      (room === data.average || row[0] === room) && (sound === data.all || row[1] === sound));
+      (scene === data.average || row[0] === scene) && (sound === data.all || row[1] === sound));
     rows.sort((one, other) => (one[9] === null) - (other[9] === null)); // playable ones first
     at("episodes-title").textContent =
-      `${own.name}, ${sound}, ${room.replaceAll("_", " ")}: ${rows.length} episodes`;
+      `${own.name}, ${sound}, ${scene.replaceAll("_", " ")}: ${rows.length} episodes`;
     const body = at("episode-list").tBodies[0];
     body.replaceChildren(...rows.map((row) => line(row, own)));
     at("episode-list").dataset.run = run;
@@ -47,11 +47,11 @@
   }
 
   function line(row, run) {
-    const [room, sound, number, metres, sight, doors, outcome, spl, actions, media, place] = row;
-    const opens = media !== null || run.ways;
+    const [scene, sound, number, metres, sight, doors, outcome, spl, actions, media, place] = row;
+    const opens = media !== null || run.paths;
     const mark = media !== null ? "\u266B" : opens ? "\u219D" : "";
     const tr = document.createElement("tr");
-    const texts = [mark, room.replaceAll("_", " "), sound, number,
+    const texts = [mark, scene.replaceAll("_", " "), sound, number,
       metres.toFixed(1), sight ? "in sight" : "out of sight", doors,
       outcome.replaceAll("_", " "), spl.toFixed(2), actions];
     texts.forEach((text, index) => {
@@ -73,7 +73,7 @@
     const row = event.target.closest("tr.open");
     if (row) {
       const { media, place } = row.dataset;
-      if (media === "null") open(way_of(Number(at("episode-list").dataset.run), Number(place)));
+      if (media === "null") open(path_only(Number(at("episode-list").dataset.run), Number(place)));
       else open(embedded(Number(media)));
       at("episode").scrollIntoView({ block: "start" });
     }
@@ -81,16 +81,16 @@
 
   const embedded = (media) => ({ media, ...read(`episode-${media}`) });
 
-  // An episode of which the page holds the way alone.
-  function way_of(run, place) {
-    const { plan, states } = read(`ways-${run}`)[place];
-    const [room, sound, number, metres, , , outcome, spl, actions] = data.runs[run].episodes[place];
+  // An episode of which only the path is embedded.
+  function path_only(run, place) {
+    const { plan, states } = read(`paths-${run}`)[place];
+    const [scene, sound, number, metres, , , outcome, spl, actions] = data.runs[run].episodes[place];
     const cells = data.plans[plan].cells;
     const goal = cells[data.runs[run].episodes[place][11]];
     const path = states.map((state) => [...cells[state >> 2], state & 3]);
     const end = `${outcome.replaceAll("_", " ")}, SPL ${spl.toFixed(2)}, ${actions} actions`;
-    const title = `${room}, ${sound}, episode ${number}: source ${metres.toFixed(1)} m away`;
-    return { run, plan, title, goal, path, outcome: end, heard: null, belief: null, memory: null,
+    const title = `${scene}, ${sound}, episode ${number}: source ${metres.toFixed(1)} m away`;
+    return { run, plan, title, goal, path, outcome: end, source_estimates: null, belief: null, memory: null,
       twins: [], media: null };
   }
 
@@ -126,7 +126,7 @@
     return button;
   }
 
-  // Metres east and north of the plan's corner become units of the drawing, south at the bottom.
+  // Convert east and north in metres to units of the drawing, south at the bottom.
   const spot = ([x, y]) => [x - shown.plan.left, shown.plan.top - y];
 
   function svg(tag, attributes) {
@@ -135,7 +135,7 @@
     return node;
   }
 
-  function way(path, colour, width) {
+  function polyline(path, colour, width) {
     const points = path.map((place) => spot(place).join(",")).join(" ");
     return svg("polyline", { points, fill: "none", stroke: colour, "stroke-width": width,
       "stroke-linejoin": "round", "stroke-linecap": "round" });
@@ -148,22 +148,22 @@
     if (own.views) at("view").src = views[own.views[index]];
     const [x, y, heading] = own.path[index];
     const last = own.path.length - 1;
-    const bump = own.collided?.[index] ? ", ran into something" : "";
+    const bump = own.collided?.[index] ? ", collision" : "";
     const next = own.action && index < last ? `; next: ${ACTIONS[own.action[index]]}` : "";
     const end = index === last ? `; ${own.outcome}` : "";
     at("caption").textContent =
       `step ${index} of ${last}, facing ${HEADINGS[heading]}${bump}${next}${end}`;
     const colour = data.runs[own.run].colour;
-    const marks = shown.ghosts.map((ghost) => way(ghost.path, data.runs[ghost.run].colour, 0.03));
+    const marks = shown.ghosts.map((ghost) => polyline(ghost.path, data.runs[ghost.run].colour, 0.03));
     if (own.memory) marks.unshift(...recalled(index));
-    marks.push(way(own.path, colour, 0.03), way(own.path.slice(0, index + 1), colour, 0.09));
+    marks.push(polyline(own.path, colour, 0.03), polyline(own.path.slice(0, index + 1), colour, 0.09));
     const [ax, ay] = spot([x, y]);
-    if (own.heard) {
-      const [hx, hy] = spot(own.heard[index]);
+    if (own.source_estimates) {
+      const [hx, hy] = spot(own.source_estimates[index]);
       marks.push(svg("line", { x1: ax, y1: ay, x2: hx, y2: hy, stroke: "#101820",
         "stroke-width": 0.03, "stroke-dasharray": "0.08 0.08" }));
       marks.push(svg("path", { d: "M-.2 0H.2M0-.2V.2", stroke: "#101820", "stroke-width": 0.11,
-        transform: `translate(${hx} ${hy})`, id: "heard" }));
+        transform: `translate(${hx} ${hy})`, id: "source-estimate" }));
     }
     const [gx, gy] = spot(own.goal);
     const star = [...Array(10).keys()].map((corner) => {
@@ -180,14 +180,14 @@
     believe(index);
   }
 
-  // The exploration walk that the agent remembers, and the entries that look most like here.
+  // Draw the exploration walk in memory, and the entries most similar to the current view.
   function recalled(index) {
     const entries = own().entries[Math.min(index, own().entries.length - 1)];
     const dots = entries.map((entry, rank) => {
       const [cx, cy] = spot(entry);
       return svg("circle", { cx, cy, r: rank ? 0.08 : 0.15, fill: "#7b3294", class: "entry" });
     });
-    return [way(own().walk, "#7a7a7a", 0.025), ...dots];
+    return [polyline(own().walk, "#7a7a7a", 0.025), ...dots];
   }
   const own = () => shown.own.memory;
 

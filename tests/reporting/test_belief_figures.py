@@ -3,36 +3,36 @@ import pytest
 from drawn_walks import ours, walked
 
 from avn.agents.greedy import Greedy
-from avn.reporting.thought_figures import PANELS, belief_figure, memory_figure
+from avn.reporting.belief_figures import PANELS, belief_figure, memory_figure
 
 
 def test_the_belief_grows_from_the_first_step_to_the_last() -> None:
     trace = max(walked(ours()), key=lambda own: len(own.action))
-    assert trace.thoughts is not None
-    assert trace.thoughts.free is not None
+    assert trace.beliefs is not None
+    assert trace.beliefs.free is not None
     panels = [axes for axes in belief_figure(trace, "ours").axes if axes.images]
     assert len(panels) == min(PANELS, len(trace.action))
     first, last = (panels[end].images[0].get_array() for end in (0, -1))
-    np.testing.assert_allclose(first, trace.thoughts.free[0] / 255)
-    np.testing.assert_allclose(last, trace.thoughts.free[-1] / 255)
+    np.testing.assert_allclose(first, trace.beliefs.free[0] / 255)
+    np.testing.assert_allclose(last, trace.beliefs.free[-1] / 255)
     known = [(np.abs(belief - 0.5) > 0.01).sum() for belief in (first, last)]
     assert known[0] < known[1]
     # the image lies in metres: its corner is half a cell from the centre of its first square
     left, _, bottom, _ = panels[0].images[0].get_extent()
-    np.testing.assert_allclose([left, bottom], trace.thoughts.low * 0.5 - 0.25)
+    np.testing.assert_allclose([left, bottom], trace.beliefs.low * 0.5 - 0.25)
 
 
 def test_the_memory_is_drawn_with_its_walk_and_what_it_returned() -> None:
     trace = walked(ours(explores=True), [0])[0]
     assert trace.walk is not None
-    assert trace.thoughts is not None
-    assert trace.thoughts.retrieved is not None
+    assert trace.beliefs is not None
+    assert trace.beliefs.retrieved is not None
     left, right = memory_figure(trace, "ours").axes[:2]
     lines = dict(zip(*reversed(left.get_legend_handles_labels()), strict=True))
     centres = trace.place.grid.centres
     np.testing.assert_allclose(lines["exploration walk"].get_xydata(), centres[trace.walk // 4])
     np.testing.assert_allclose(
-        lines["most alike entry"].get_xydata(), trace.thoughts.retrieved[:, 0, :2]
+        lines["most similar entry"].get_xydata(), trace.beliefs.retrieved[:, 0, :2]
     )
     assert (right.lines[1].get_ydata() == 0).all()  # odometry does not lie here
 

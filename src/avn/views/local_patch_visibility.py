@@ -1,4 +1,4 @@
-"""Which cells of the local occupancy patch the agent's camera sees."""
+"""Visibility of the cells of the local occupancy patch in the agent's camera."""
 
 from __future__ import annotations
 
@@ -13,22 +13,24 @@ from avn.apartments.surfaces import Surfaces
 from avn.apartments.walls import HEADROOM
 from avn.views.camera import CameraConfig, ray_directions
 
-# Rays across a picture with which visibility is looked for; a cell ahead is 3 rays wide or more.
+# Rays along the image side; a cell ahead of the agent is at least 3 rays wide.
 RAYS = 40
-# A ray goes on for half a wall behind what it meets, so that it enters the wall's own cell.
+# Metres by which a ray continues behind its first hit, to enter the cell of the wall it hits.
 _INTO = 0.06
+# Step of the march along a ray, metres.
 _STRIDE = 0.05
 
 
 def visible_cells(surfaces: Surfaces, grid: Grid, camera: CameraConfig) -> NDArray[np.bool_]:
-    """Which cells of the window are visible from every state.
+    """Compute the visible cells of the local patch of every state.
 
-    A cell is visible where some of its volume below the height of a person is in the picture and
-    nothing hides it; what stands in the cell counts as the cell's own.
+    A cell is visible if part of its volume below the height of a person is in the image and not
+    occluded. Objects in a cell count as part of the cell.
 
     Parameters
     ----------
     surfaces : Surfaces
+        Surfaces of the apartment, which occlude.
     grid : Grid
         C free cells.
     camera : CameraConfig
@@ -36,6 +38,7 @@ def visible_cells(surfaces: Surfaces, grid: Grid, camera: CameraConfig) -> NDArr
     Returns
     -------
     (4 C, 5, 5) bool
+        By state, row ahead of the agent and column.
     """
     rays = np.stack([ray_directions(camera, h, RAYS).reshape(-1, 3) for h in range(4)])
     return _seen(
@@ -64,7 +67,7 @@ def _seen(
     for state in range(4 * len(centres)):
         cell, heading = state // 4, state % 4
         origin = np.array([centres[cell, 0], centres[cell, 1], height])
-        # unit vectors (east, north) to the front and to the right
+        # forward unit vector (east, north)
         fx, fy = (heading == 1) * 1.0 - (heading == 3), (heading == 0) * 1.0 - (heading == 2)
         for n in range(rays.shape[1]):
             ray = rays[heading, n]
@@ -89,7 +92,7 @@ def _hit(
     origin: NDArray[np.float64],
     ray: NDArray[np.float64],
 ) -> float:
-    """Metres along a ray to the first surface; infinite where there is none."""
+    """Compute the distance along a ray to the first surface in metres; infinite for none."""
     nearest = np.inf
     for q in range(len(axis)):
         a = axis[q]

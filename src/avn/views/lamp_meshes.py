@@ -1,4 +1,4 @@
-"""Lamps as they are seen: a globe at each, and the rod that it hangs on."""
+"""Meshes of pendant lamps: a globe and the rod that it hangs on."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import CEILING
+from avn.views.building_mesh import BuildingMesh
 from avn.views.lights import Lamps, Light
 from avn.views.mesh import BUILDING, Mesh, boxes, join
-from avn.views.shell import Shell
 
-# How bright a lamp looks to the film: less than it shines, as to an eye that is used to it.
-_LOOKS = 6.0
+# Emission of a lamp as the camera records it, as exposed. It is lower than its radiance.
+_EMISSION = 6.0
 
 
-def fixtures(lamps: Lamps, light: Light) -> Shell:
-    """A globe at each lamp and the rod that it hangs on."""
+def lamp_meshes(lamps: Lamps, light: Light) -> BuildingMesh:
+    """Build the globe and rod of each lamp."""
     globe = _globe(lamps.radius)
     vertices = (lamps.centre[:, None, None] + globe[None]).reshape(-1, 3, 3)
     count, several = len(vertices), len(lamps.centre)
@@ -31,18 +31,20 @@ def fixtures(lamps: Lamps, light: Light) -> Shell:
     upper = np.column_stack((lamps.centre[:, :2] + 0.01, np.full(several, CEILING)))
     grey = np.full((several, 3), 0.3, dtype=np.float32)
     rods = boxes(lower, upper, grey, np.full(several, BUILDING))
-    glow = np.zeros((count + len(rods), 3), dtype=np.float32)
-    shine = np.zeros_like(glow)
-    glow[:count] = _LOOKS * light.lamp
+    emission = np.zeros((count + len(rods), 3), dtype=np.float32)
+    radiance = np.zeros_like(emission)
+    emission[:count] = _EMISSION * light.lamp
     # a convex body of surface S and radiance L has the mean intensity L S / 4 (Cauchy)
     surface = np.linalg.norm(np.cross(globe[:, 1] - globe[:, 0], globe[:, 2] - globe[:, 0]), axis=1)
-    radiance = 4 * lamps.intensity / (surface.sum() / 2)
-    shine[:count] = np.repeat(radiance, len(globe), axis=0)
-    return Shell(join((globes, rods)), glow, shine, np.zeros(len(glow), dtype=bool))
+    lamp_radiance = 4 * lamps.intensity / (surface.sum() / 2)
+    radiance[:count] = np.repeat(lamp_radiance, len(globe), axis=0)
+    return BuildingMesh(
+        join((globes, rods)), emission, radiance, np.zeros(len(emission), dtype=bool)
+    )
 
 
 def _globe(radius: float, rings: int = 6, spokes: int = 12) -> NDArray[np.float64]:
-    """Triangles (N, 3, 3) of a sphere, seen from outside counter-clockwise."""
+    """Triangulate a sphere (N, 3, 3), counter-clockwise seen from outside."""
     polar = np.linspace(0, np.pi, rings + 1)
     turn = np.linspace(0, 2 * np.pi, spokes + 1)
     point = np.stack(
@@ -56,5 +58,5 @@ def _globe(radius: float, rings: int = 6, spokes: int = 12) -> NDArray[np.float6
     a, b = point[:-1, :-1], point[1:, :-1]
     c, d = point[1:, 1:], point[:-1, 1:]
     upper = np.stack((a, b, c), axis=2)[:-1]
-    lower = np.stack((a, c, d), axis=2)[1:]  # without those that shrink to a line at the poles
+    lower = np.stack((a, c, d), axis=2)[1:]  # without the degenerate ones at the poles
     return radius * np.concatenate((upper.reshape(-1, 3, 3), lower.reshape(-1, 3, 3)))

@@ -1,4 +1,4 @@
-"""What an agent with a map believed: the map as it grows, and the memory with its retrievals."""
+"""Figures of an agent's beliefs: occupancy map over time, and memory retrievals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from avn.core.actions import HEADINGS
-from avn.navigation.trace import Thoughts, Trace
+from avn.navigation.trace import BeliefTrace, Trace
 from avn.reporting.sound_figures import draw_plan
 from avn.reporting.trajectory_figures import (
     FRONT,
@@ -24,43 +24,57 @@ from avn.reporting.trajectory_figures import (
 )
 
 PANELS = 6
-# The path on a map of beliefs, where it must show on every colour.
+# Colour of the path, distinct from all colours of the belief.
 WALKED = "#e0218a"
 
 
 def belief_figure(trace: Trace, name: str) -> Figure:
-    """Draw the belief of which squares are free, at some steps from the first to the last.
+    """Draw the occupancy belief at some steps from the first to the last.
 
     Raises
     ------
     ValueError
-        Where the agent had no such map, or did nothing.
+        If the agent has no occupancy map or took no action.
     """
-    thoughts = trace.thoughts
-    if thoughts is None or thoughts.free is None or not len(trace.action):
-        raise ValueError("this agent had no map of free squares")
+    beliefs = trace.beliefs
+    if beliefs is None or beliefs.free is None or not len(trace.action):
+        raise ValueError("this agent has no map of free squares")
     steps = np.unique(np.linspace(0, len(trace.action) - 1, PANELS).round().astype(int))
     figure = figure_of(11.5, 3.3 * -(-len(steps) // 3) + 0.6)
     panels = figure.subplots(-(-len(steps) // 3), 3, squeeze=False).reshape(-1)
     for axes in panels[len(steps) :]:
         axes.set_visible(False)
     for axes, step in zip(panels, steps, strict=False):
-        image = draw_belief(axes, trace, thoughts, int(step))
+        image = draw_belief(axes, trace, beliefs, int(step))
         axes.set_title(f"before action {step + 1}", fontsize=9)
     bar = figure.colorbar(image, ax=list(panels), fraction=0.025, pad=0.01)
-    bar.set_label("believed to be free")
+    bar.set_label("belief that a square is free")
     figure.suptitle(f"{name}: {title_of(trace)}; {outcome(trace)}", fontsize=10)
     return figure
 
 
-def draw_belief(axes: Axes, trace: Trace, thoughts: Thoughts, step: int) -> Any:
-    """Draw the belief at one step under the walls, with the path so far; gives the image."""
-    assert thoughts.free is not None
-    free = thoughts.free[step]
+def draw_belief(axes: Axes, trace: Trace, beliefs: BeliefTrace, step: int) -> Any:
+    """Draw the occupancy belief at one step, with the walls and the path so far.
+
+    Parameters
+    ----------
+    axes : Axes
+    trace : Trace
+    beliefs : BeliefTrace
+        With an occupancy belief, `free`.
+    step : int
+
+    Returns
+    -------
+    AxesImage
+        The belief.
+    """
+    assert beliefs.free is not None
+    free = beliefs.free[step]
     image = axes.imshow(
         free / 255.0,
         origin="lower",
-        extent=extent(thoughts.low, free.shape),
+        extent=extent(beliefs.low, free.shape),
         cmap="BrBG",
         vmin=0,
         vmax=1,
@@ -68,7 +82,7 @@ def draw_belief(axes: Axes, trace: Trace, thoughts: Thoughts, step: int) -> Any:
     )
     if (plan := plan_of(trace)) is not None:
         draw_plan(axes, plan)
-        for patch in axes.patches:  # furniture, of which the belief shall tell
+        for patch in axes.patches:  # furniture, which would hide the belief
             if patch.get_zorder() == 0:
                 patch.set_visible(False)
     path = trace.path[: step + 1]
@@ -76,25 +90,27 @@ def draw_belief(axes: Axes, trace: Trace, thoughts: Thoughts, step: int) -> Any:
     front = FRONT[trace.state[step] % HEADINGS]
     axes.plot(*np.stack((path[-1], path[-1] + 0.4 * front)).T, color=WALKED, lw=2, zorder=5)
     axes.plot(*path[-1], "o", color="white", mec=WALKED, mew=2, markersize=7, zorder=6)
-    if trace.heard is not None:
-        axes.plot(*trace.heard[step], "P", color="#1f6fb2", mec="white", markersize=9, zorder=7)
+    if trace.source_estimates is not None:
+        axes.plot(
+            *trace.source_estimates[step], "P", color="#1f6fb2", mec="white", markersize=9, zorder=7
+        )
     axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=12, zorder=7)
-    left, right, bottom, top = extent(thoughts.low, free.shape)
+    left, right, bottom, top = extent(beliefs.low, free.shape)
     axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[], xlabel="", ylabel="")
     return image
 
 
 def memory_figure(trace: Trace, name: str) -> Figure:
-    """Draw the exploration walk that an agent remembers, and what it recognised on its way.
+    """Draw the exploration walk in an agent's memory, its retrievals, and their errors.
 
     Raises
     ------
     ValueError
-        Where the agent had no memory.
+        If the agent has no memory.
     """
-    thoughts = trace.thoughts
-    if thoughts is None or thoughts.retrieved is None or thoughts.similarity is None:
-        raise ValueError("this agent had no memory")
+    beliefs = trace.beliefs
+    if beliefs is None or beliefs.retrieved is None or beliefs.similarity is None:
+        raise ValueError("this agent has no memory")
     figure = figure_of(11.5, 6.2)
     left, right = figure.subplots(1, 2, width_ratios=(1.35, 1))
     draw_place(left, trace)
@@ -102,24 +118,29 @@ def memory_figure(trace: Trace, name: str) -> Figure:
         walk = trace.place.grid.centres[trace.walk // HEADINGS]
         left.plot(*walk.T, color="#9a9a9a", lw=1.0, zorder=6, label="exploration walk")
     draw_walk(left, trace, RUN_COLOURS[1], f"{name}: {outcome(trace)}")
-    here, best = trace.path[:-1], thoughts.retrieved[:, 0]
-    sure = np.clip((thoughts.similarity[:, 0] - 0.9) / 0.1, 0.08, 1)
+    here, best = trace.path[:-1], beliefs.retrieved[:, 0]
+    sure = np.clip((beliefs.similarity[:, 0] - 0.9) / 0.1, 0.08, 1)
     for place, entry, weight in zip(here, best, sure, strict=True):
         line = np.stack((place, entry[:2]))
         left.plot(*line.T, color=RUN_COLOURS[0], lw=1.2, alpha=float(weight), zorder=8)
     left.plot(
-        *best[:, :2].T, ".", color=RUN_COLOURS[0], markersize=6, zorder=9, label="most alike entry"
+        *best[:, :2].T,
+        ".",
+        color=RUN_COLOURS[0],
+        markersize=6,
+        zorder=9,
+        label="most similar entry",
     )
     left.set_title(title_of(trace), fontsize=10)
     left.legend(loc="upper left", bbox_to_anchor=(0, 0), frameon=False, fontsize=9)
     off = np.linalg.norm(best[:, :2] - here, axis=1)
-    right.plot(off, color=RUN_COLOURS[0], label="most alike entry, metres off")
-    lost = np.linalg.norm(thoughts.pose[:, :2] - here, axis=1)
-    right.plot(lost, color="#222222", ls="--", label="where it takes itself to be, metres off")
+    right.plot(off, color=RUN_COLOURS[0], label="position error of the most similar entry")
+    lost = np.linalg.norm(beliefs.pose[:, :2] - here, axis=1)
+    right.plot(lost, color="#222222", ls="--", label="error of the estimated pose")
     right.set(xlabel="action", ylabel="metres", ylim=(-0.1, max(1.0, off.max(), lost.max()) * 1.3))
     cosine = right.twinx()
-    cosine.plot(thoughts.similarity[:, 0], color="#3a9a5b", lw=1, label="cosine")
-    cosine.set(ylabel="cosine of the most alike entry", ylim=(0, 1.02))
+    cosine.plot(beliefs.similarity[:, 0], color="#3a9a5b", lw=1, label="cosine similarity")
+    cosine.set(ylabel="cosine similarity of the most similar entry", ylim=(0, 1.02))
     handles = [*right.get_lines(), *cosine.get_lines()]
     right.legend(
         handles=handles, frameon=False, fontsize=9, loc="lower left", bbox_to_anchor=(0, 1)

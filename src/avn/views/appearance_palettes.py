@@ -1,14 +1,14 @@
-"""The pools that the three parts of a split draw colours, patterns and light from.
+"""Appearance palettes: colours, patterns and light of the three parts of a split.
 
-Nothing stands in two pools. Each spans light and dark, warm and cold, plain and patterned, so
-that another pool is new and yet not of another world.
+The palettes are disjoint. Each spans light and dark, warm and cold, plain and patterned, so that
+their distributions are similar.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-# sRGB colours by part and material; an apartment's room takes one, off by 4 of 255 at most.
+# sRGB colours, 0 to 255, by part and material. A room draws one, with jitter of up to 4.
 COLOURS: dict[str, dict[str, Any]] = {
     "train": {
         "parquet": (
@@ -114,7 +114,7 @@ COLOURS: dict[str, dict[str, Any]] = {
     },
 }
 
-# How courses are laid: name, courses, stones in each (or length of a stave), metres a repeat.
+# Patterns: name, courses, stones per course (or length of a stave), size of a repeat in metres.
 LAYOUTS: dict[str, dict[str, Any]] = {
     "train": {
         "parquet": (
@@ -147,7 +147,7 @@ LAYOUTS: dict[str, dict[str, Any]] = {
     },
 }
 
-# Colours of lamps and sky (linear RGB), whose brightness says how much of the light is theirs.
+# Linear RGB of lamps and sky, relative to a usual brightness of 1.
 LIGHT: dict[str, tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...]] = {
     "train": (
         ((1.0, 0.82, 0.62), (0.86, 0.96, 1.10)),

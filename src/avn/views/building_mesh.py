@@ -1,4 +1,4 @@
-"""The shell of an apartment while it is being built: rectangles and the pictures on them."""
+"""Meshes with their own light, and a builder that makes them from textured rectangles."""
 
 from __future__ import annotations
 
@@ -14,43 +14,61 @@ from avn.views.textures import Pattern
 
 
 @dataclass(frozen=True)
-class Shell:
-    """The building as T triangles that face the air, and its lamps.
+class BuildingMesh:
+    """T triangles of a building, which face its interior, and their own light.
 
     Attributes
     ----------
     mesh : Mesh
-        `piece` is -1 throughout.
-    glow : (T, 3) float32
-        Light that the film gets of a triangle by itself, exposed; it multiplies the texture. 0 for
-        most.
-    shine : (T, 3) float32
-        Radiance with which it lights others, as `Lamps` and `Panes` have it.
-    shade : (T,) bool
-        Whether it keeps light off others; lamps' own fixtures do not.
+        `piece` is -1 for all triangles.
+    emission : (T, 3) float32
+        Linear RGB that a triangle adds to the image, as exposed; multiplied by its texture. 0
+        for most triangles.
+    radiance : (T, 3) float32
+        Linear RGB radiance with which a triangle lights others, as in `Lamps` and `Panes`.
+    occluder : (T,) bool
+        True if the triangle casts shadows; lamp meshes do not.
     """
 
     mesh: Mesh
-    glow: NDArray[np.float32]
-    shine: NDArray[np.float32]
-    shade: NDArray[np.bool_]
+    emission: NDArray[np.float32]
+    radiance: NDArray[np.float32]
+    occluder: NDArray[np.bool_]
 
 
 @dataclass
-class ShellBuilder:
-    """Collects rectangles and the pictures on them."""
+class BuildingMeshBuilder:
+    """Builder of a mesh from textured rectangles.
+
+    Attributes
+    ----------
+    corners : list of (4, 3) float64
+        Corners of each rectangle in metres.
+    uv : list of (4, 2) float64
+        Texture coordinates of the corners.
+    texture : list of int
+        Index into `textures`; -1 for plain colour.
+    colour : list of (3,) float64
+        Linear RGB albedo.
+    emission, radiance : list of (3,) float64
+        Linear RGB; see `BuildingMesh`.
+    textures : list of (h, w, 3) uint8
+        sRGB images.
+    known : dict
+        Index and pattern of each image that `picture` has painted.
+    """
 
     corners: list[NDArray[np.float64]] = field(default_factory=list)
     uv: list[NDArray[np.float64]] = field(default_factory=list)
     texture: list[int] = field(default_factory=list)
     colour: list[NDArray[np.float64]] = field(default_factory=list)
-    glow: list[NDArray[np.float64]] = field(default_factory=list)
-    shine: list[NDArray[np.float64]] = field(default_factory=list)
+    emission: list[NDArray[np.float64]] = field(default_factory=list)
+    radiance: list[NDArray[np.float64]] = field(default_factory=list)
     textures: list[NDArray[np.uint8]] = field(default_factory=list)
     known: dict[tuple[object, ...], tuple[int, Pattern]] = field(default_factory=dict)
 
     def picture(self, paint: Callable[..., Pattern], *names: object) -> tuple[int, Pattern]:
-        """Number of a picture, painted the first time that it is asked for by these names."""
+        """Return a texture's index and pattern; paint it on the first call with these names."""
         key = (paint, *names)
         if key not in self.known:
             made = paint(*names)
@@ -66,11 +84,31 @@ class ShellBuilder:
         normal: float,
         texture: tuple[int, Pattern] | None = None,
         colour: NDArray[np.float64] | None = None,
-        glow: NDArray[np.float64] | None = None,
-        shine: NDArray[np.float64] | None = None,
+        emission: NDArray[np.float64] | None = None,
+        radiance: NDArray[np.float64] | None = None,
         whole: Rect | None = None,
     ) -> None:
-        """Add a rectangle; `whole` is the part of the plane that the picture covers once."""
+        """Add an axis-aligned rectangle.
+
+        Parameters
+        ----------
+        axis : int
+            Axis of the normal: 0 x, 1 y, 2 z.
+        offset : float
+            Coordinate along `axis` in metres.
+        rect : Rect
+            Lower and upper bounds along the two other axes in metres.
+        normal : float
+            Sign of the normal along `axis`.
+        texture : (int, Pattern), optional
+            Index into `textures`, and the pattern. Without it the colour is plain.
+        colour : (3,) float64, optional
+            Linear RGB albedo, white by default.
+        emission, radiance : (3,) float64, optional
+            Linear RGB; see `BuildingMesh`. 0 by default.
+        whole : Rect, optional
+            Bounds in metres that the texture covers once. Without it the texture repeats.
+        """
         a, b = (1, 2) if axis == 0 else (0, 2) if axis == 1 else (0, 1)
         place = np.array(
             [(rect[0], rect[1]), (rect[2], rect[1]), (rect[2], rect[3]), (rect[0], rect[3])]
@@ -90,10 +128,11 @@ class ShellBuilder:
         self.uv.append(uv)
         self.texture.append(-1 if texture is None else texture[0])
         self.colour.append(np.ones(3) if colour is None else colour)
-        self.glow.append(np.zeros(3) if glow is None else glow)
-        self.shine.append(np.zeros(3) if shine is None else shine)
+        self.emission.append(np.zeros(3) if emission is None else emission)
+        self.radiance.append(np.zeros(3) if radiance is None else radiance)
 
-    def shell(self) -> Shell:
+    def build(self) -> BuildingMesh:
+        """Return the mesh of all rectangles, two triangles each."""
         corners, uv = np.stack(self.corners), np.stack(self.uv)
         count = 2 * len(corners)
         halves = np.array([[0, 1, 2], [0, 2, 3]])
@@ -105,8 +144,8 @@ class ShellBuilder:
             textures=tuple(self.textures),
             piece=np.full(count, BUILDING, dtype=np.int32),
         )
-        glow, shine = (
+        emission, radiance = (
             np.repeat(np.stack(values), 2, axis=0).astype(np.float32)
-            for values in (self.glow, self.shine)
+            for values in (self.emission, self.radiance)
         )
-        return Shell(mesh, glow, shine, np.ones(count, dtype=bool))
+        return BuildingMesh(mesh, emission, radiance, np.ones(count, dtype=bool))

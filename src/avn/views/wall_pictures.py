@@ -1,4 +1,4 @@
-"""Pictures on the walls: where walls are bare, rooms are told apart by what hangs there."""
+"""Procedural pictures on walls, which make rooms with similar surfaces distinguishable."""
 
 from __future__ import annotations
 
@@ -10,24 +10,42 @@ from scipy.ndimage import gaussian_filter
 
 from avn.apartments.floor_plan import DOOR_WIDTH, WALL_THICKNESS, Doorway, FloorPlan, Room, Window
 from avn.apartments.surfaces import Rect
+from avn.views.appearance_palettes import COLOURS
 from avn.views.drawing import Image, draw, noise
-from avn.views.pools import COLOURS
 from avn.views.textures import Pattern
 
 DEPTH = 0.02
 BORDER = 0.03
 _PIXELS = 128
-# Heights above the floor that pictures hang between.
+# Lowest and highest height of a picture, metres above the floor.
 _LOW, _HIGH = 1.1, 1.95
-# Furniture this near to a wall hides what hangs behind it.
+# Furniture at most this many metres from a wall hides the pictures behind it.
 _REACH = 0.35
-_EYES = 1.5
-_LIKELY = {"bathroom": 0.3, "kitchen": 0.5, "bedroom": 0.8, "living_room": 0.9}
+# Height of the centre of a picture, metres above the floor.
+_CENTRE = 1.5
+# Probability of a picture on a free stretch of wall, by kind of room.
+_PROBABILITY = {"bathroom": 0.3, "kitchen": 0.5, "bedroom": 0.8, "living_room": 0.9}
 
 
 @dataclass(frozen=True)
-class Hanging:
-    """A picture on a wall: the wall's face, the sign of its normal, and where on it."""
+class WallPicture:
+    """A framed picture on a wall.
+
+    Attributes
+    ----------
+    axis : int
+        Axis of the wall's normal: 0 x, 1 y.
+    offset : float
+        Coordinate of the wall's face along `axis` in metres.
+    normal : float
+        Sign of the wall's normal.
+    rect : Rect
+        Bounds along the wall and in height in metres.
+    picture : Pattern
+        The painting.
+    frame : (3,) float64
+        sRGB colour of the frame, 0 to 1.
+    """
 
     axis: int
     offset: float
@@ -37,17 +55,25 @@ class Hanging:
     frame: NDArray[np.float64]
 
 
-def hangings(plan: FloorPlan, part: str, look: int) -> list[Hanging]:
-    """Choose and paint the pictures of an apartment.
+def wall_pictures(plan: FloorPlan, part: str, appearance_seed: int) -> list[WallPicture]:
+    """Draw the wall pictures of an apartment.
 
-    None hangs before a doorway or window, or where furniture hides it.
+    No picture covers a doorway or window or hangs behind furniture.
+
+    Parameters
+    ----------
+    plan : FloorPlan
+    part : {"train", "validation", "test"}
+        Split part, which selects the appearance palette.
+    appearance_seed : int
+        Seed of the random choices within the palette.
     """
     found = []
     for index, room in enumerate(plan.rooms):
-        rng = draw("hangings", part, plan.name, index, look)
+        rng = draw("hangings", part, plan.name, index, appearance_seed)
         for axis, offset, normal, span in _faces(room):
             for low, high in _bare(plan, axis, offset, span):
-                if high - low < 0.7 or rng.random() > _LIKELY[room.kind]:
+                if high - low < 0.7 or rng.random() > _PROBABILITY[room.kind]:
                     continue
                 count = 2 if high - low > 2.4 and rng.random() < 0.5 else 1
                 for place in range(count):
@@ -56,11 +82,11 @@ def hangings(plan: FloorPlan, part: str, look: int) -> list[Hanging]:
                     step = (high - low) / count
                     free = step - width - 0.2
                     left = low + place * step + 0.1 + free * rng.uniform(0.3, 0.7)
-                    sill = _EYES - height / 2
+                    sill = _CENTRE - height / 2
                     rect = (left, sill, left + width, sill + height)
-                    pool = COLOURS[part]["frame"]
-                    frame = np.array(pool[int(rng.random() * len(pool))]) / 255
-                    found.append(Hanging(axis, offset, normal, rect, _paint(rng, part), frame))
+                    palette = COLOURS[part]["frame"]
+                    frame = np.array(palette[int(rng.random() * len(palette))]) / 255
+                    found.append(WallPicture(axis, offset, normal, rect, _paint(rng, part), frame))
     return found
 
 
@@ -73,7 +99,7 @@ def _faces(room: Room) -> list[tuple[int, float, float, tuple[float, float]]]:
 def _bare(
     plan: FloorPlan, axis: int, offset: float, span: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """Stretches of a wall's face that nothing opens or hides."""
+    """Find the stretches of a wall's face without openings or furniture."""
     taken = []
     openings: list[Doorway | Window] = [*plan.doorways, *plan.windows]
     for opening in openings:
@@ -98,9 +124,9 @@ def _bare(
 
 
 def _paint(rng: np.random.Generator, part: str) -> Pattern:
-    """A picture in four colours: fields, hills, blots or stripes."""
-    pool = COLOURS[part]["art"]
-    colours = np.array(pool[int(rng.random() * len(pool))], dtype=np.float64) / 255
+    """Paint a picture in four colours: blocks, waves, blobs or stripes."""
+    palette = COLOURS[part]["art"]
+    colours = np.array(palette[int(rng.random() * len(palette))], dtype=np.float64) / 255
     colours = colours[np.argsort(rng.random(4))]
     at = (np.arange(_PIXELS) + 0.5) / _PIXELS
     x, y = np.meshgrid(at, at)

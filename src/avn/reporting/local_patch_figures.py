@@ -1,4 +1,4 @@
-"""What TensorBoard shows of an occupancy network: view, truth and estimate, side by side."""
+"""TensorBoard figures of an occupancy network: view, true and predicted local patch."""
 
 from __future__ import annotations
 
@@ -13,22 +13,24 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 
-def window_figure(
+def local_patch_figure(
     views: NDArray[np.uint8],
     free: NDArray[np.bool_],
     visible: NDArray[np.bool_],
     estimate: NDArray[Any],
     title: str,
 ) -> Figure:
-    """Draw views beside their windows.
+    """Draw views beside their true and predicted local patches.
 
     Parameters
     ----------
     views : (N, H, W, 3) uint8 array
+        sRGB.
     free, visible : (N, 5, 5) bool arrays
-        Row 0 is the nearest; it is drawn at the bottom. Cells that nothing of is seen are hatched.
+        True for free and for visible cells. Row 0 is the nearest and drawn at the bottom;
+        invisible cells are hatched.
     estimate : (N, 5, 5) array
-        Probability that each cell is free.
+        Predicted probability that a cell is free.
     title : str
     """
     figure = Figure(figsize=(7.2, 2.3 * len(views)), layout="constrained")
@@ -37,8 +39,8 @@ def window_figure(
     for row, pictures in enumerate(zip(views, free.astype(float), estimate, strict=True)):
         for column, picture in enumerate(pictures):
             at = axes[row, column]
-            look: dict[str, Any] = {"origin": "lower", "vmin": 0, "vmax": 1} if column else {}
-            at.imshow(picture, **look)
+            style: dict[str, Any] = {"origin": "lower", "vmin": 0, "vmax": 1} if column else {}
+            at.imshow(picture, **style)
             at.set_xticks([])
             at.set_yticks([])
             if not row:
@@ -54,22 +56,22 @@ def window_figure(
     return figure
 
 
-class WindowFigures(Callback):
-    """Writes some views of the validation apartments with their windows to TensorBoard.
+class LocalPatchFigures(Callback):
+    """Callback that logs views of the validation apartments with local patches to TensorBoard.
 
     Parameters
     ----------
     every : int
-        Epochs between two figures; the last epoch has one too.
+        Epochs between figures; the first and last epoch are always logged.
     count : int
-        How many views.
+        Number of views.
     """
 
     def __init__(self, every: int = 5, count: int = 8) -> None:
         self.every, self.count = every, count
 
     def on_validation_epoch_end(self, trainer: L.Trainer, pl_module: Any) -> None:
-        """Write one figure."""
+        """Log one figure."""
         epoch = trainer.current_epoch + 1
         due = epoch % self.every == 0 or epoch in (1, trainer.max_epochs)
         if not due or not isinstance(trainer.logger, TensorBoardLogger):
@@ -80,7 +82,7 @@ class WindowFigures(Callback):
         pictures = (batch["pictures"] * 255).round().byte().permute(0, 2, 3, 1)
         with torch.inference_mode():
             estimate = pl_module(pictures.to(pl_module.device)).cpu()[:, 0]
-        figure = window_figure(
+        figure = local_patch_figure(
             pictures.numpy(),
             batch["target"].bool().numpy(),
             batch["visible"].numpy(),
