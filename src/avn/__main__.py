@@ -8,7 +8,7 @@ import sys
 COMMANDS = {
     "generate": "build the apartments of a split, their sound and their views",
     "train": "train a network or an actor-critic agent",
-    "eval": "let an agent walk, and print its row of the table",
+    "eval": "evaluate an agent, and print its row of the table",
     "reproduce": "run all rows with all seeds, and print the whole table",
     "figures": "draw trajectories, estimates and maps of finished runs",
     "report": "write one HTML page of finished runs, with views and sound",
@@ -16,7 +16,7 @@ COMMANDS = {
 
 
 def main() -> int:
-    """Run the command that the command line names; gives its exit code."""
+    """Run the command of the command line and return its exit code."""
     name, rest = (sys.argv[1] if len(sys.argv) > 1 else "--help"), sys.argv[2:]
     if name in ("-h", "--help"):
         print(_usage())

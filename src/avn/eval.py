@@ -1,4 +1,4 @@
-"""`python -m avn.eval agent=greedy sound=alarm`: lets an agent walk and prints its row."""
+"""`python -m avn.eval agent=greedy sound=alarm`: evaluates an agent and prints its row."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from avn.core.progress import log
 
 @command("eval")
 def main(cfg: DictConfig) -> Path:
-    """Evaluate one row, or open its finished run, and print the table."""
+    """Evaluate an agent, or read its finished run, and print the table."""
     from avn.pipeline import films
     from avn.pipeline.run import Evaluation, show_run
     from avn.pipeline.stage import build

@@ -1,6 +1,6 @@
-"""`python -m avn.figures RUN [RUN...]`: pictures of what happened in finished runs.
+"""`python -m avn.figures RUN [RUN...]`: draws figures of episodes of finished runs.
 
-PNG files in the first run's folder `figures/`, and the same in its TensorBoard.
+Writes PNG files to the folder `figures/` of the first run, and the figures to its TensorBoard.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from avn.config.cli import plainly
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw what the command line asks for; gives the exit code."""
+    """Draw the figures and return the exit code."""
     return plainly("avn.figures", lambda: _draw(_parse(arguments)))
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser("python -m avn.figures", description=__doc__)
     parser.add_argument(
-        "runs", nargs="+", type=Path, metavar="RUN", help="folders of runs; others stand beside"
+        "runs", nargs="+", type=Path, metavar="RUN", help="folders of runs, to compare side by side"
     )
     parser.add_argument("--show", default="typical", help="which: typical, success or failure")
     parser.add_argument("--count", default=4, type=int, help="how many episodes to choose")

@@ -1,4 +1,4 @@
-"""`python -m avn.generate`: builds the apartments of a split, their sound and their views."""
+"""`python -m avn.generate`: builds the apartments of a split, their acoustics and their views."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from avn.core.progress import log
 
 @command("generate")
 def main(cfg: DictConfig) -> Path:
-    """Make all scenes of the split and export what is asked for."""
+    """Build all scenes of the split and write the exports."""
     from avn.pipeline.export import generate, settings_of
 
     refuse_unread("generate", cfg, settings_of(cfg))

@@ -1,6 +1,6 @@
 """`python -m avn.report RUN [RUN...]`: one HTML file with results, episodes, views and sound.
 
-The file holds all that it shows, and works without a network.
+The file is self-contained and works offline.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from avn.core.progress import log
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the page that the command line asks for; gives the exit code."""
+    """Write the page and return the exit code."""
     return plainly("avn.report", lambda: _report(_parse(arguments)))
 
 
@@ -27,7 +27,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         type=int,
         default=1,
         metavar="N",
-        help="episodes of each room and sound with views and sound, 0 for none (1)",
+        help="episodes of each scene and sound with views and sound, 0 for none (1)",
     )
     parser.add_argument(
         "--show",
@@ -37,7 +37,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--paths",
         action="store_true",
-        help="the ways of all other episodes too; walks each run to its end, some minutes",
+        help="paths of all other episodes too; replays each run, which takes some minutes",
     )
     parser.add_argument("--output", type=Path, help="the file (outputs/report/report-<hash8>.html)")
     return parser.parse_args(arguments)

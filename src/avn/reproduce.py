@@ -1,4 +1,4 @@
-"""`python -m avn.reproduce`: runs every row that exists and prints the table."""
+"""`python -m avn.reproduce`: evaluates all rows with all seeds and prints the table."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from avn.core.progress import log
 
 @command("reproduce")
 def main(cfg: DictConfig) -> Path:
-    """Make what is missing, run each row with each seed, and print the whole table."""
+    """Build what is missing, evaluate each row with each seed, and print the table."""
     from avn.pipeline.reproduction import reproduce, settings_of
 
     rows = [compose_row(cfg, row) for row in dict.fromkeys(cfg.rows)]

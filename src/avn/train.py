@@ -1,4 +1,4 @@
-"""`python -m avn.train model=sound_cnn`: trains the parts that learn."""
+"""`python -m avn.train model=sound_cnn`: trains a network or an actor-critic agent."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from avn.core.progress import log
 
 @command("train")
 def main(cfg: DictConfig) -> Path:
-    """Train the model, or open it where it is trained, and print what was measured."""
+    """Train the model, or read it where it is trained, and print its metrics."""
     from avn.pipeline.models import model_of, train_model
 
     model = model_of(cfg)
     refuse_unread("train", cfg, {*model.read(), "model.name"})
-    figures = train_model(model)
-    for name, value in figures.items():
+    metrics = train_model(model)
+    for name, value in metrics.items():
         log(f"{name}: {value:.3g}")
     log(str(model.folder))
     return model.folder

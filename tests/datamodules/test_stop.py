@@ -58,7 +58,7 @@ def test_an_epoch_shows_the_goal_as_often_as_it_should() -> None:
 
 def test_the_prior_is_the_share_of_states_at_the_goal() -> None:
     module = data()
-    shares = [goal(scene).mean() for scene in module.scenes["training"]]
+    shares = [goal(scene).mean() for scene in module.scenes["train"]]
     assert module.prior == pytest.approx(shares[0])
 
 

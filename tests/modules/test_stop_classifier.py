@@ -15,7 +15,7 @@ from avn.core.settings import typed
 from avn.datamodules.stop import StopData
 from avn.modules.stop_classifier import StopClassifier
 from avn.modules.training import BEST, fit, load_weights
-from avn.pipeline.audio_inference import hear
+from avn.pipeline.audio_inference import infer
 from avn.reporting.stop_figures import StopFigures
 
 CONF = Path(__file__).parents[2] / "conf" / "stop_model"
@@ -105,7 +105,7 @@ def test_every_state_gets_a_probability(
 ) -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
     given = (scene, sounds, run[1], 2, Microphone(), 5, False)
-    scores = hear(*given)
+    scores = infer(*given)
     assert scores.shape == (2, 4 * scene.grid.cells, 2, 2)
     assert scores.dtype == torch.float32
     assert 0 <= float(scores.min()) < float(scores.max()) <= 1

@@ -49,13 +49,13 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
 @pytest.mark.parametrize("rate", [8000, 48000])
 def test_it_does_at_another_sampling_rate(tmp_path: Path, rate: int) -> None:
     metrics = fit(*build(rate, epochs=10), tmp_path)
-    assert metrics["loss/training"] < 0.8 * error_before(rate)
-    assert metrics["bearing_deg/training/all/all"] < 45  # 90 is chance
+    assert metrics["loss/train"] < 0.8 * error_before(rate)
+    assert metrics["bearing_deg/train/all/all"] < 45  # 90 is chance
 
 
 def test_training_lowers_the_error(run: tuple[Path, dict[str, Any]]) -> None:
     _, metrics = run
-    assert metrics["loss/training"] < error_before()
+    assert metrics["loss/train"] < error_before()
     assert metrics["epochs"] == 4
 
 
@@ -70,7 +70,7 @@ def error_before(rate: int = 16000) -> float:
 
 def test_metrics_are_by_split_sight_and_sound(run: tuple[Path, dict[str, Any]]) -> None:
     _, metrics = run
-    for split in ("validation", "training"):
+    for split in ("validation", "train"):
         for sight in ("in_sight", "out_of_sight", "all"):
             for sound in ("hiss", "hum", "all"):
                 assert metrics[f"error_m/{split}/{sight}/{sound}"] > 0

@@ -8,7 +8,7 @@ from small import composed
 
 from avn.apartments.splits import FROZEN
 from avn.core.errors import UserError
-from avn.pipeline.apartments import TRAINING, Apartments, apartments_of_every_part
+from avn.pipeline.apartments import TRAINING, Apartments, apartments_of_all_subsets
 from avn.pipeline.scenes import DirectSound, Geometry
 from avn.pipeline.stage import build
 
@@ -21,8 +21,8 @@ def test_a_part_without_apartments_is_named_where_it_is_needed(tmp_path):
         path.unlink()
     cfg = composed(f"split.folder={folder}", "split.name=own")
     assert len(Apartments(cfg, "test").plans) == 5
-    assert [own.part for own in apartments_of_every_part(cfg)] == ["validation", "test"]
-    with pytest.raises(UserError, match=r"split\.train is empty: no floor plan of that part in"):
+    assert [own.subset for own in apartments_of_all_subsets(cfg)] == ["validation", "test"]
+    with pytest.raises(UserError, match=r"split\.train is empty: no floor plan of that subset in"):
         Apartments(cfg, "train").plans  # noqa: B018
     with pytest.raises(UserError, match=r"training\.scenes\.train is empty"):
         Apartments(cfg, "train", TRAINING).plans  # noqa: B018

@@ -8,7 +8,7 @@ from avn.acoustics.microphone import Microphone
 from avn.core.classes import build_object
 from avn.datamodules.clip_set import ClipSet
 from avn.modules.sound_cnn import SoundCnn
-from avn.pipeline.audio_inference import hear, sound_errors
+from avn.pipeline.audio_inference import infer, source_estimate_errors
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def model() -> SoundCnn:
 @pytest.fixture(scope="module")
 def heard(model: SoundCnn) -> torch.Tensor:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    return hear(scene, sounds, model, 2, Microphone(), seed=5, progress=False)
+    return infer(scene, sounds, model, 2, Microphone(), seed=5, progress=False)
 
 
 def test_every_clip_is_heard(model: SoundCnn, heard: torch.Tensor) -> None:
@@ -46,7 +46,7 @@ def test_takes_and_seeds_differ_and_repeat(model: SoundCnn, heard: torch.Tensor)
 
     def again(realisations: int, seed: int) -> torch.Tensor:
         given = (scene, sounds, model, realisations, Microphone(), seed, False)
-        return hear(*given)
+        return infer(*given)
 
     assert torch.equal(again(2, 5), heard)
     torch.testing.assert_close(again(1, 5), heard[:, :, :, :1], atol=1e-4, rtol=1e-4)
@@ -56,7 +56,7 @@ def test_takes_and_seeds_differ_and_repeat(model: SoundCnn, heard: torch.Tensor)
 
 def test_errors_are_medians_over_the_right_clips(heard: torch.Tensor) -> None:
     scene, sounds = synthetic_scene(), synthetic_sounds()
-    table = sound_errors(scene, heard, sounds.names).set_index(["sound", "sight"])
+    table = source_estimate_errors(scene, heard, sounds.names).set_index(["sound", "sight"])
     truth = scene.brirs.locations.numpy()[:, :, None, None]
     error = np.linalg.norm(heard.numpy() - truth, axis=-1)
     seen = np.repeat(scene.in_sight, 4, axis=1)
@@ -71,7 +71,7 @@ def test_front_back_confusions_are_counted() -> None:
     truth = scene.brirs.locations[:, :, None, None].repeat(1, 1, 2, 1, 1)
     confused = truth.clone()
     confused[:, :, 1] *= -1.0
-    table = sound_errors(scene, confused, sounds.names).set_index(["sound", "sight"])
+    table = source_estimate_errors(scene, confused, sounds.names).set_index(["sound", "sight"])
     assert table.loc[("hiss", "all"), "front_back"] == 0.0
     assert table.loc[("hiss", "all"), "error_m"] == 0.0
     # At the source itself there is no bearing.

@@ -17,7 +17,7 @@ from avn.pipeline.occupancy import LocalPatches, OccupancyNetwork
 from avn.pipeline.policy import Policy
 from avn.pipeline.run import Evaluation
 from avn.pipeline.scenes import DirectSound, Geometry, LateReverberation
-from avn.pipeline.sound_network import SoundNetwork, SourceEstimates, hears
+from avn.pipeline.sound_network import SoundNetwork, SourceEstimates, has_sound_model
 from avn.pipeline.stage import missing
 from avn.pipeline.stop_classifier import StopNetwork, StopProbabilities
 from avn.pipeline.views import RenderedViews
@@ -345,4 +345,4 @@ def test_only_rows_that_say_so_are_shown_the_truth(row):
     cfg = composed(f"agent={row}", "split=mini")
     agent = build_agent(cfg)
     assert agent.privileged == cfg.agent.privileged == (row == "oracle")
-    assert "source_estimate" not in agent.needs or hears(cfg)
+    assert "source_estimate" not in agent.needs or has_sound_model(cfg)

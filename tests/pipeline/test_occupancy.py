@@ -1,28 +1,28 @@
-"""How well an occupancy network does, in each room and in all."""
+"""How well an occupancy network does, in each scene and in all."""
 
 import pytest
 import torch
 from small import composed
 from synthetic_scene import synthetic_scene
 
-from avn.modules.window_metrics import window_metrics
+from avn.modules.local_patch_metrics import local_patch_metrics
 from avn.pipeline.apartments import Apartments
-from avn.pipeline.occupancy import LocalPatches, true_windows, window_errors
+from avn.pipeline.occupancy import LocalPatches, local_patch_errors, true_local_patches
 from avn.views.camera import CameraConfig
 
 
-def test_errors_are_of_each_room_and_of_all():
-    camera, rooms = CameraConfig(), [synthetic_scene("a"), synthetic_scene("b", 2.5)]
-    truths = [true_windows(room.plan, camera) for room in rooms]
+def test_errors_are_of_each_scene_and_of_all():
+    camera, scenes = CameraConfig(), [synthetic_scene("a"), synthetic_scene("b", 2.5)]
+    truths = [true_local_patches(scene.plan, camera) for scene in scenes]
     # A perfect estimate.
     estimates = [free.float() * 0.98 + 0.01 for free, _ in truths]
     prior = torch.full((5, 5), 0.7)
-    table = window_errors(rooms, camera, estimates, prior).set_index(["scene", "by", "cells"])
+    table = local_patch_errors(scenes, camera, estimates, prior).set_index(["scene", "by", "cells"])
     assert table.loc[("a", "network", "visible"), "auc"] == pytest.approx(1.0)
     assert table.loc[("all", "network", "all"), "accuracy"] == pytest.approx(1.0)
     assert table.loc[("all", "prior", "all"), "auc"] == pytest.approx(0.5)
     free, visible = (torch.cat(each) for each in zip(*truths, strict=True))
-    expected = window_metrics(torch.full_like(free, 0.7, dtype=torch.float), free, visible)
+    expected = local_patch_metrics(torch.full_like(free, 0.7, dtype=torch.float), free, visible)
     assert table.loc[("all", "prior", "visible"), "ece"] == pytest.approx(expected["ece/visible"])
     assert len(table) == 3 * 2 * 2
 

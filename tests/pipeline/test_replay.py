@@ -1,4 +1,4 @@
-"""Finished runs of the mini split, walked again."""
+"""Finished runs of the mini split, replayed."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from avn.config.registry import register
 from avn.config.saved import read_config
 from avn.core.errors import UserError
 from avn.pipeline import replay
-from avn.pipeline.observed import Perceived
+from avn.pipeline.observed import RunObservations
 from avn.pipeline.run import Evaluation
 from avn.pipeline.sound_network import SoundNetwork
 from avn.reporting.results import write_csv
@@ -37,7 +37,7 @@ def made(command, outputs, agent, *more):
 @pytest.mark.parametrize(
     "agent", ["random_walk", "greedy", "a3c_va_m_mapper", "ours_noexp", "ours_exp"]
 )
-def test_a_run_is_walked_again_from_its_own_config(command, outputs, agent):
+def test_a_run_is_replayed_from_its_config(command, outputs, agent):
     folder = made(command, outputs, agent)
     run = open_run(folder)
     # nothing of the config was lost: what it makes has the same name
@@ -70,10 +70,10 @@ def test_a_config_that_was_written_and_read_makes_the_same(row):
 def test_the_clips_of_a_trace_are_those_that_the_network_heard(command, outputs):
     run = open_run(made(command, outputs, "greedy"))
     model = SoundNetwork(run.cfg).load()
-    perceived = Perceived(run)
+    observations = RunObservations(run)
     for trace in replay.traces(run, [1, len(run.episodes) - 2]):
         with torch.inference_mode():
-            source_estimates = model.eval()(perceived.clips(trace))
+            source_estimates = model.eval()(observations.clips(trace))
         heading, here = trace.state % 4, trace.path
         right, front = source_estimates.double().unbind(1)
         east = torch.stack((right, front, -right, -front))[heading, torch.arange(len(here))]
@@ -91,7 +91,7 @@ def test_records_of_another_making_are_refused(command, outputs):
         episodes = run.episodes.copy()
         episodes.loc[0, "end_cell"] += 1
         write_csv(episodes, path)
-        with pytest.raises(UserError, match=r"walked again, its episodes end otherwise"):
+        with pytest.raises(UserError, match=r"the replayed episodes differ"):
             replay.traces(open_run(folder), [0])
     finally:
         path.write_bytes(whole)
@@ -166,6 +166,6 @@ def test_names_tell_runs_apart_by_what_differs(command, outputs):
     third = open_run(made(command, outputs, "greedy"))
     assert replay.names_of([one, third]) == ["random_walk", "greedy"]
     assert replay.names_of([one, other]) == ["random_walk, seed=0", "random_walk, seed=1"]
-    with pytest.raises(UserError, match="walked other episodes"):
+    with pytest.raises(UserError, match="has other episodes"):
         replay.same_episodes(one, [0], other)
     assert replay.same_episodes(one, [2, 0], third) == [2, 0]

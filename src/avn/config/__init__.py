@@ -1,0 +1,1 @@
+"""Config schemas, command line, help and checks of settings."""

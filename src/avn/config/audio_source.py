@@ -1,4 +1,4 @@
-"""Lets a path to an audio file stand as an option of the config group `sound`."""
+"""Hydra plugin that accepts paths of audio files as options of the config group `sound`."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _GROUP = "sound/"
 
 
 def is_audio(option: str) -> bool:
-    """Whether an option of the group `sound` is the path of an audio file."""
+    """Return whether an option of the group `sound` is the path of an audio file."""
     return option.lower().endswith(AUDIO_SUFFIXES)
 
 
 def quoted(value: str) -> str:
-    """Quote the audio paths of an override, so that blanks, commas and dots may stand in them."""
+    """Quote the audio paths of an override, so that they may contain blanks, commas and dots."""
     if Path(value).expanduser().is_file() and is_audio(value):
         parts = [value]
     elif value.startswith(("[", "'", '"')):
@@ -36,13 +36,15 @@ def _quote(path: str) -> str:
 
 
 class AudioFiles(ConfigSource):
-    """A config source in which `sound/PATH.wav` holds the mapping {stem: PATH.wav}."""
+    """Config source in which `sound/PATH.wav` holds the mapping {stem: PATH.wav}."""
 
     @staticmethod
     def scheme() -> str:
+        """Return the scheme of the source in search paths."""
         return "audio"
 
     def load_config(self, config_path: str) -> ConfigResult:
+        """Return the mapping from the file's stem to its path."""
         if not self.is_config(config_path):
             raise ConfigLoadError(f"Config not found: {config_path}")
         path = config_path.removeprefix(_GROUP)
@@ -55,22 +57,27 @@ class AudioFiles(ConfigSource):
         )
 
     def is_group(self, config_path: str) -> bool:
+        """Return False: the source has no groups."""
         return False
 
     def is_config(self, config_path: str) -> bool:
+        """Return whether the path is an audio file's in the group `sound`."""
         return config_path.startswith(_GROUP) and is_audio(config_path)
 
     def available(self) -> bool:
+        """Return True: the source needs no folder."""
         return True
 
     def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
+        """Return no names: audio files are not listed."""
         return []
 
 
 class AudioFilesPath(SearchPathPlugin):
-    """Adds `AudioFiles` to the places where Hydra looks."""
+    """Plugin that adds `AudioFiles` to Hydra's search path."""
 
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
+        """Append the source to the search path."""
         search_path.append("avn", "audio://")
 
 

@@ -1,8 +1,8 @@
-"""What makes Hydra answer as the README says.
+"""Entry point of the commands: Hydra with a more lenient syntax and one-line errors.
 
-Beyond `hydra.main`: `-m` anywhere on the line, list keys without brackets, a path to an audio
-file as an option of the group `sound`, keys checked even behind `+`, sweeps that name what
-failed, and every mistake of the user's as one line and exit code 2.
+In addition to `hydra.main`: `-m` anywhere on the line, list keys without brackets, a path of an
+audio file as an option of the group `sound`, keys checked even behind `+`, sweeps that name the
+jobs that failed, and one line and exit code 2 for every mistake of the user.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from avn.config.folder import conf_folder, without_folders
 from avn.config.help import help_text, is_asked
 from avn.core.errors import UserError
 
-# What is chosen for the training world, as Hydra spells it; apartments and acoustics follow the
-# test world until they are chosen.
+# Groups of the training world, from their key to Hydra's spelling. Apartments and acoustics are
+# those of the test world unless they are set.
 TRAINING = {
     "training.scenes": "+split@training.scenes",
     "training.acoustics": "+acoustics@training.acoustics",
@@ -42,10 +42,10 @@ USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLErr
 
 
 def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]], Callable[[], int]]:
-    """Make a command of a function that takes the composed config; `--help` is answered at once.
+    """Decorate a function of the composed config as a command.
 
-    The command returns the exit code: 0, 1 for a fault of ours, 2 for a mistake of the
-    user's, 130 when interrupted.
+    The command returns the exit code: 0, 1 for an internal error, 2 for a mistake of the user,
+    130 when interrupted. `--help` is answered without composing a config.
     """
 
     def decorate(task: Callable[[DictConfig], Path | None]) -> Callable[[], int]:
@@ -65,8 +65,8 @@ def _help(config_name: str) -> None:
 
 
 def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
-    # The schemas import torch and sweeps pandas. Help is asked for before, and needs neither; for
-    # the same reason each command imports what it needs of `pipeline/` where it calls it.
+    # The schemas import torch and sweeps pandas. Help is answered before and needs neither; for the
+    # same reason each command imports from `pipeline/` where it needs it.
     from avn.config import option_files, registry, sweeps
 
     registry.register()
@@ -80,7 +80,7 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
             return
         try:
             checked(cfg)
-        except Exception as error:  # kept from Hydra, which would print lines of its own
+        except Exception as error:  # hidden from Hydra, which would print its own lines
             errors.append(error)
 
     def checked(cfg: DictConfig) -> Path | None:
@@ -105,7 +105,7 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
 
 
 def _compose_and_do(config_name: str, job: Callable[[DictConfig], None]) -> None:
-    """Let Hydra compose the config and do the job; sets aside what the options do not have."""
+    """Let Hydra compose the config and run the job; set unknown settings of options aside."""
     spare.begin()
     composed = hydra.main(
         version_base="1.3", config_path=str(conf_folder()), config_name=config_name
@@ -120,7 +120,7 @@ def _compose_and_do(config_name: str, job: Callable[[DictConfig], None]) -> None
 
 
 def plainly(name: str, task: Callable[[], None]) -> int:
-    """Run a command that has no config of its own; the exit codes are those of `command`."""
+    """Run a command without a Hydra config; the exit codes are those of `command`."""
     try:
         task()
     except KeyboardInterrupt:
@@ -140,15 +140,14 @@ def _report(name: str, error: Exception, line: str | None) -> int:
 
 
 def arrange(arguments: Iterable[str]) -> list[str]:
-    """Put the command line into the form that Hydra's parser takes.
+    """Convert the command line to the form that Hydra's parser takes.
 
-    `-m` comes first wherever it stood, declared list keys get their brackets, and the paths
-    of audio files their quotes.
+    `-m` is moved to the front, list keys get brackets, and paths of audio files get quotes.
 
     Raises
     ------
     UserError
-        Where a group is given no option, or an option goes by a name that it had.
+        Where a group is given no option, or an option its former name.
     """
     sweep, rest = [], []
     groups = _groups()
@@ -172,11 +171,11 @@ def arrange(arguments: Iterable[str]) -> list[str]:
 
 
 def _check_training(arguments: list[str]) -> None:
-    """Refuse a setting of the training world that would change the test world with it."""
+    """Refuse a setting of the training world that would change the test world too."""
     for name in ("scenes", "acoustics"):
         key = f"training.{name}"
         for argument in arguments:
-            follows = not any(own.startswith(f"{TRAINING[key]}=") for own in arguments)
+            follows = not any(given.startswith(f"{TRAINING[key]}=") for given in arguments)
             if argument.startswith(f"{key}.") and follows:
                 raise UserError(
                     f"{argument}: the training world follows the test world here; choose its "
@@ -185,7 +184,7 @@ def _check_training(arguments: list[str]) -> None:
 
 
 def _groups() -> dict[str, str]:
-    """The config groups and a list of their options."""
+    """Return the config groups, each with a list of its options as text."""
     folders = [folder for folder in sorted(conf_folder().iterdir()) if folder.is_dir()]
     return {f.name: ", ".join(sorted(file.stem for file in f.glob("*.yaml"))) for f in folders}
 
@@ -196,7 +195,7 @@ def check_keys(cfg: DictConfig, path: str = "") -> None:
     Raises
     ------
     UserError
-        Naming the key and those that there are.
+        For an unknown key; the message lists the known ones.
     """
     schema = OmegaConf.get_type(cfg)
     if dataclasses.is_dataclass(schema):
@@ -211,10 +210,10 @@ def check_keys(cfg: DictConfig, path: str = "") -> None:
 
 
 def explain(error: BaseException, composed: bool = True) -> str | None:
-    """One line for a mistake of the user's; None where the fault is ours.
+    """Return a one-line message for a mistake of the user, None for an internal error.
 
-    What goes wrong before the job starts comes of the command line or of a config file, so
-    there every exception counts as the user's.
+    Errors before the job starts come from the command line or a config file, so every exception
+    there counts as a mistake of the user.
     """
     chain = [error]
     while (cause := chain[-1].__cause__ or chain[-1].__context__) and cause not in chain:

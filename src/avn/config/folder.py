@@ -1,4 +1,4 @@
-"""Where the config files lie: ours, and those of `--config-dir MINE`."""
+"""Folders of config files: those of the package and those of `--config-dir MINE`."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ _OPTIONS = ("--config-dir", "-cd")
 
 
 def conf_folder() -> Path:
-    """The folder of configs: beside the package in a wheel, at the top of a checkout."""
+    """Return the folder of configs: in the package in a wheel, at the top of a checkout."""
     packaged = Path(__file__).parents[1] / "conf"
     return packaged if packaged.is_dir() else Path(__file__).parents[3] / "conf"
 
 
 def without_folders(arguments: Iterable[str]) -> tuple[list[str], list[Path]]:
-    """A command line without the config folders of the user's, and these folders.
+    """Split a command line into the arguments without `--config-dir`, and its folders.
 
     Raises
     ------
     UserError
-        Where one is no folder.
+        Where a given path is no folder.
     """
     rest, folders, given = [], [], iter(arguments)
     for argument in given:

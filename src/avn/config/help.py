@@ -1,7 +1,6 @@
-"""The help of a command: what can be given on its line, read from the files of the `conf` folder.
+"""Help of a command: its settings, read from the comments of the files in the `conf` folder.
 
-Nothing is composed here and nothing heavy is imported, so that the answer comes at once. The
-names and the texts are those of the files.
+Nothing is composed and no large package imported, so that help is fast.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ from avn.config.folder import conf_folder
 
 _WIDTH = 100
 _SWEPT = "hydra.sweeper.params."
-# What a defaults list chooses in another group, `override /GROUP: OPTION`.
+# An entry of a defaults list that sets another group, `override /GROUP: OPTION`.
 _CHOICE = re.compile(r"\boverride /(\w+)(?:@[\w.]+)?: *([^\s,\]]+)")
 
 
 @dataclass(frozen=True)
 class _Entry:
-    """A line `key: value` of a YAML file, with the comments above and beside it."""
+    """Line `key: value` of a YAML file, with the comments above and beside it."""
 
     key: str
     value: str | None
@@ -34,7 +33,7 @@ class _Entry:
 
 @dataclass(frozen=True)
 class _Config:
-    """What the help shows of a config at the top of the folder."""
+    """Content of a top-level config that the help shows."""
 
     examples: list[str]
     defaults: list[_Entry]
@@ -43,7 +42,7 @@ class _Config:
 
 @dataclass(frozen=True)
 class _Group:
-    """A group as it is chosen from: `name=OPTION`."""
+    """Config group, set by `name=OPTION`."""
 
     name: str
     options_of: str
@@ -52,25 +51,25 @@ class _Group:
 
 
 def is_asked(arguments: Iterable[str]) -> bool:
-    """Whether a command line asks for help."""
+    """Return whether a command line asks for help."""
     return not {"-h", "--help"}.isdisjoint(arguments)
 
 
 def help_text(command: str, folders: Sequence[Path], spellings: Mapping[str, str]) -> str:
-    """The help of a command.
+    """Return the help of a command.
 
     Parameters
     ----------
     command : str
-        The name of its config.
+        Name of the command's config.
     folders : sequence of Path
-        Config folders of the user's, whose options are listed too.
+        Config folders of the user, whose options are listed too.
     spellings : mapping of str to str
-        Keys that the command line takes for a group at another place, with Hydra's spelling.
+        Hydra's spelling of the keys that set a group of the training world.
     """
     places = [conf_folder(), *folders]
     configs = list(_configs(command, places))
-    own, *shared = (_set(config.settings) for config in configs)
+    command_settings, *shared = (_settings(config.settings) for config in configs)
     examples = configs[0].examples or [f"python -m avn.{command}"]
     lines = [
         f"usage: python -m avn.{command} [KEY=VALUE ...] [-m] [--config-dir FOLDER]",
@@ -79,7 +78,11 @@ def help_text(command: str, folders: Sequence[Path], spellings: Mapping[str, str
         "Groups, GROUP=OPTION. * marks the default; in brackets stands what an option chooses in",
         "other groups in place of their defaults.",
         *(line for group in _groups(configs, places, spellings) for line in _listed(group, places)),
-        *(["", "Settings of this command, with their defaults:", *own] if own else ()),
+        *(
+            ["", "Settings of this command, with their defaults:", *command_settings]
+            if command_settings
+            else ()
+        ),
         "",
         "Settings of all commands, with their defaults:",
         *(line for settings in shared for line in settings),
@@ -91,7 +94,7 @@ def help_text(command: str, folders: Sequence[Path], spellings: Mapping[str, str
 
 
 def _more(example: str, configs: Iterable[_Config]) -> list[str]:
-    """What is beside the settings; `example` is a line that the command runs."""
+    """Return the closing lines of the help; `example` is a command line."""
     swept = " ".join(
         f"{entry.key.removeprefix(_SWEPT)}={entry.value}"
         for config in configs
@@ -110,11 +113,11 @@ def _more(example: str, configs: Iterable[_Config]) -> list[str]:
 
 
 def _configs(name: str, places: Sequence[Path]) -> Iterator[_Config]:
-    """A config at the top of the folders and those that it takes in, the outer ones first."""
-    found = [path for place in places if (path := place / f"{name}.yaml").is_file()]
-    if "/" in name or not found:  # a schema, or `_self_`
+    """Yield a top-level config and those in its defaults list, the outer ones first."""
+    paths = [path for place in places if (path := place / f"{name}.yaml").is_file()]
+    if "/" in name or not paths:  # a schema, or `_self_`
         return
-    config = _read(found[-1])
+    config = _read(paths[-1])
     yield config
     for entry in config.defaults:
         if entry.value is None:
@@ -140,7 +143,7 @@ def _read(path: Path) -> _Config:
 def _entries(
     key: yaml.Node, node: yaml.Node, lines: Sequence[str], prefix: str = ""
 ) -> Iterator[_Entry]:
-    """The entries of a key; those of a mapping have dots in their names."""
+    """Yield the entries of a key; those of a mapping have dotted names."""
     name = f"{prefix}{key.value}"
     if isinstance(node, yaml.MappingNode) and node.value:
         for inner, value in node.value:
@@ -153,7 +156,7 @@ def _entries(
 
 
 def _plain(node: yaml.Node) -> str:
-    """A value as it may be given on the command line."""
+    """Return a value as it may be given on the command line."""
     if isinstance(node, yaml.SequenceNode):
         return f"[{', '.join(map(_plain, node.value))}]"
     if isinstance(node, yaml.MappingNode):
@@ -163,7 +166,7 @@ def _plain(node: yaml.Node) -> str:
 
 
 def _above(lines: Sequence[str], key: yaml.Node) -> str:
-    """The comment that ends on the line above a key."""
+    """Return the comment that ends on the line above a key."""
     start = end = key.start_mark.line
     while start and lines[start - 1].lstrip().startswith("#"):
         start -= 1
@@ -171,52 +174,52 @@ def _above(lines: Sequence[str], key: yaml.Node) -> str:
 
 
 def _leading(lines: Iterable[str]) -> list[str]:
-    """The lines of the comment that a file begins with, Hydra's `@package` left out."""
-    found = []
+    """Return the lines of a file's leading comment, without Hydra's `@package`."""
+    comment = []
     for line in lines:
         if not line.startswith("#"):
             break
-        found.append(line.lstrip("# ").rstrip())
-    return [line for line in found if line and not line.startswith("@package")]
+        comment.append(line.lstrip("# ").rstrip())
+    return [line for line in comment if line and not line.startswith("@package")]
 
 
 def _groups(
     configs: Sequence[_Config], places: Sequence[Path], spellings: Mapping[str, str]
 ) -> list[_Group]:
-    """The groups that a command has, those of the test world first, those of the user's last."""
+    """Return the groups of a command: test world first, groups of the user's folders last."""
     names = {spelt.lstrip("+"): key for key, spelt in spellings.items()}
-    found: dict[str, _Group] = {}
+    groups: dict[str, _Group] = {}
     for entry in (entry for config in configs for entry in config.defaults):
         key = re.sub(r"^(override |optional )*/?", "", entry.key)
         if entry.value is not None and not key.startswith("hydra/"):
             group = _Group(names.get(key, key), key.split("@")[0], entry.value, entry.above)
-            found.setdefault(key, group)
+            groups.setdefault(key, group)
     for key, name in names.items():
-        found.setdefault(key, _Group(name, key.split("@")[0]))
+        groups.setdefault(key, _Group(name, key.split("@")[0]))
     ours, *theirs = [[path.name for path in sorted(p.iterdir()) if path.is_dir()] for p in places]
     new = dict.fromkeys(name for names in theirs for name in names if name not in ours)
     return [
-        *(group for key, group in found.items() if "@" not in key),
-        *(group for key, group in found.items() if "@" in key),
+        *(group for key, group in groups.items() if "@" not in key),
+        *(group for key, group in groups.items() if "@" in key),
         *(_Group(f"+{name}", name) for name in new if _options(name, places)),
     ]
 
 
 def _options(group: str, places: Sequence[Path]) -> dict[str, str]:
-    """The options of a group, each with what its file says of it."""
+    """Return the options of a group, each with its description."""
     files = {file.stem: file for place in places for file in (place / group).glob("*.yaml")}
-    return {name: _said(files[name].read_text("utf-8", "replace")) for name in sorted(files)}
+    return {name: _description(files[name].read_text("utf-8", "replace")) for name in sorted(files)}
 
 
-def _said(text: str) -> str:
-    """The comment that an option begins with, and what it chooses in other groups."""
-    chosen = [f"{group}={option}" for group, option in _CHOICE.findall(text)]
-    return " ".join([*_leading(text.splitlines()), *([f"[{', '.join(chosen)}]"] if chosen else [])])
+def _description(text: str) -> str:
+    """Return the leading comment of an option's file, and the other groups that it sets."""
+    others = ", ".join(f"{group}={option}" for group, option in _CHOICE.findall(text))
+    return " ".join([*_leading(text.splitlines()), *([f"[{others}]"] if others else [])])
 
 
 def _listed(group: _Group, places: Sequence[Path]) -> Iterator[str]:
     state = {"???": " (must be given)", "null": " (none by default)"}.get(group.default or "", "")
-    if group.name.lstrip("+") != group.options_of:  # its options stand at that group already
+    if group.name.lstrip("+") != group.options_of:  # its options are listed there
         yield from _comment(group.comment, "  ")
         default = f" (default: {group.default})" if group.default and not state else state
         yield f"  {group.name}: one of {group.options_of}{default}"
@@ -230,8 +233,8 @@ def _listed(group: _Group, places: Sequence[Path]) -> Iterator[str]:
         yield _wrapped(comment, f"    {mark} {name:{column}}", " " * (6 + column))
 
 
-def _set(entries: Iterable[_Entry]) -> list[str]:
-    """The settings as they are given, each under its comment; those of Hydra are left out."""
+def _settings(entries: Iterable[_Entry]) -> list[str]:
+    """Return the settings as lines `key=value`, each under its comment, without Hydra's."""
     lines = []
     for entry in entries:
         if not entry.key.startswith("hydra."):

@@ -1,6 +1,6 @@
-"""Config files whose options are typed by the classes they name: ours and those of the user.
+"""Hydra plugin that types config options by the classes that they name in `_target_`.
 
-A user's folders are named on the command line, `--config-dir FOLDER`.
+It reads the package's config files and those of the user's folders (`--config-dir FOLDER`).
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from avn.config.schema import SCHEMAS
 from avn.config.signatures import is_option, with_signature
 from avn.core.errors import UserError
 
-# The folders of the command line that is being run.
+# Config folders of the current command line.
 _folders: list[str] = []
 
 
 def take_folders(arguments: list[str]) -> list[str]:
-    """Take the config folders out of a command line; gives what is left of it.
+    """Register the config folders of a command line and return the other arguments.
 
     Raises
     ------
     UserError
-        Where one is no folder.
+        Where a given path is no folder.
     """
     rest, folders = without_folders(arguments)
     _folders[:] = map(str, folders)
@@ -39,7 +39,15 @@ def take_folders(arguments: list[str]) -> list[str]:
 
 
 class OptionFiles(ConfigSource):
-    """A folder of config files in which an option has the schema of its class."""
+    """Config source: a folder of files in which each option has the schema of its class.
+
+    Parameters
+    ----------
+    provider : str
+        Name of the source in Hydra's messages.
+    path : str
+        Path of the folder, with the scheme `avn://`.
+    """
 
     def __init__(self, provider: str, path: str) -> None:
         super().__init__(provider, path)
@@ -47,40 +55,47 @@ class OptionFiles(ConfigSource):
 
     @staticmethod
     def scheme() -> str:
+        """Return the scheme of the source in search paths."""
         return "avn"
 
     def load_config(self, config_path: str) -> ConfigResult:
-        found = self._files.load_config(config_path)
-        node = found.config
+        """Read a config file, refuse former names, and add the schema of each option."""
+        result = self._files.load_config(config_path)
+        node = result.config
         if not isinstance(node, DictConfig):
-            return found
-        is_global = found.header.get("package") == "_global_"
+            return result
+        is_global = result.header.get("package") == "_global_"
         check_file(config_path, node, is_global)
         if is_global:
-            for own in map(str, list(node)):
-                if is_option(own, node[own]):
-                    node[own] = with_signature(own, node[own])
+            for group in map(str, list(node)):
+                if is_option(group, node[group]):
+                    node[group] = with_signature(group, node[group])
         else:
-            found.config = _typed(config_path, node)
-        return found
+            result.config = _typed(config_path, node)
+        return result
 
     def is_group(self, config_path: str) -> bool:
+        """Return whether the folder has a group of this name."""
         return self._files.is_group(config_path)
 
     def is_config(self, config_path: str) -> bool:
+        """Return whether the folder has a file of this name."""
         return self._files.is_config(config_path)
 
     def available(self) -> bool:
+        """Return whether the folder exists."""
         return self._files.available()
 
     def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
+        """Return the names of the options of a group."""
         return self._files.list(config_path, results_filter)
 
 
 class OptionFilesPath(SearchPathPlugin):
-    """Lets `OptionFiles` read the user's folders, which come first, and ours."""
+    """Plugin that puts `OptionFiles` into Hydra's search path, the user's folders first."""
 
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
+        """Replace the package's folder in the search path and prepend the user's folders."""
         ours = conf_folder().resolve()
         for element in search_path.get_path():
             path = (element.path or "").removeprefix("file://")
@@ -121,9 +136,9 @@ def _read_option(group: str, name: str) -> DictConfig:
 
 
 def _typed(name: str, node: DictConfig) -> DictConfig:
-    """An option with its schema; one that stands on another of its group gets it from that."""
+    """Return an option with its schema; an option with `defaults` gets it from its parent."""
     defaults = node.pop("defaults", None)
-    if "/" in name and any(str(own).endswith("schema") for own in defaults or ()):
+    if "/" in name and any(str(entry).endswith("schema") for entry in defaults or ()):
         raise UserError(
             f"{name}: its defaults name a schema, which options need no more; remove it"
         )

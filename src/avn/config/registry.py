@@ -1,4 +1,4 @@
-"""What Hydra is told of before it composes a config: schemas, and where options come from."""
+"""Registration of schemas and plugins with Hydra."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from avn.config.schema import COMMANDS
 
 
 def register() -> None:
-    """Register schemas and plugins; may be called again."""
+    """Register schemas and plugins; further calls change nothing."""
     store = ConfigStore.instance()
     for command, schema in COMMANDS.items():
         store.store(name=f"{command}_schema", node=schema)

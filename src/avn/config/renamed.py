@@ -1,4 +1,4 @@
-"""Options that had another name in 0.1.0; an old name gets one line with the new one."""
+"""Options that had another name in 0.1.0: the error for an old name gives the new one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from avn.core.errors import UserError
 
-# Old key: new key. A node stands for all that is below it.
+# Old key: new key. A node covers all keys below it.
 OPTIONS = {
     "mapper.network": "occupancy_model",
     "mapper.windows": "mapper.local_patches",
@@ -56,7 +56,7 @@ OPTIONS = {
     "a3c.refresh": "algorithm.memory_refresh_interval",
     "a3c": "algorithm",
 }
-# New key: the values that have another name, old to new.
+# New key: its renamed values, old to new.
 VALUES = {
     "acoustics.direct_path": {"through_walls": "transmission", "round_corners": "diffraction"},
     "protocol.path_length": {"attempted": "moves", "walked": "metres"},
@@ -72,14 +72,14 @@ def check_name(key: str, where: str = "") -> None:
     Parameters
     ----------
     key : str
-        Dotted key, as it was given.
+        Dotted key, as given.
     where : str
-        Text before the message, such as the file that has it.
+        Prefix of the message, such as the name of the file.
 
     Raises
     ------
     UserError
-        With the new name, and with the new names of its values.
+        For an old name; the message gives the new one.
     """
     for old, new in OPTIONS.items():
         if key == old or key.startswith(f"{old}."):
@@ -98,9 +98,9 @@ def check_file(name: str, node: DictConfig, is_global: bool) -> None:
     name : str
         Group and option, such as `planner/mine`.
     node : DictConfig
-        The content of the file.
+        Content of the file.
     is_global : bool
-        Whether its keys count from the top of the config and not from the group.
+        Whether its keys are relative to the top of the config instead of the group.
     """
     start = "" if is_global or "/" not in name else f"{name.split('/')[0]}."
     for key in _keys(OmegaConf.to_container(node, resolve=False)):

@@ -1,4 +1,4 @@
-"""Configs of the rows of a table, composed as `avn.eval` composes them."""
+"""Configs of the rows of a table, composed as by `avn.eval`."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from avn.config import spare
 from avn.config.spare import compose_fitting
 from avn.core.errors import UserError
 
-# Overrides that belong to this command and not to a row.
+# Overrides of `avn.reproduce` itself.
 _OWN = ("rows", "seeds", "train_seeds", "sounds", "experiment")
 
 
 def compose_row(cfg: DictConfig, row: str) -> DictConfig:
-    """The config of a row, with the options of the command line and the sounds that are named.
+    """Compose the config of a row, with the overrides and the sounds of the command line.
 
     Parameters
     ----------
     cfg : DictConfig
-        Of `avn.reproduce`.
+        Config of `avn.reproduce`.
     row : str
-        An option of the group `agent`.
+        Option of the group `agent`.
 
     Raises
     ------
@@ -29,10 +29,10 @@ def compose_row(cfg: DictConfig, row: str) -> DictConfig:
         For a sound that the row's config does not have.
     """
     shared = [o for o in HydraConfig.get().overrides.task if o.split("=")[0] not in _OWN]
-    own = compose_fitting("eval", [*shared, *spare.settings(), f"agent={row}"])
+    config = compose_fitting("eval", [*shared, *spare.settings(), f"agent={row}"])
     for name in cfg.sounds:
-        if name not in own.sound:
-            raise UserError(f"sounds: '{name}' is none of {', '.join(own.sound)}")
+        if name not in config.sound:
+            raise UserError(f"sounds: '{name}' is none of {', '.join(config.sound)}")
     if cfg.sounds:
-        own.sound = {name: own.sound[name] for name in cfg.sounds}
-    return own
+        config.sound = {name: config.sound[name] for name in cfg.sounds}
+    return config

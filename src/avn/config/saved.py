@@ -1,4 +1,4 @@
-"""Configs that runs have saved, read back with the schema of each group."""
+"""Configs that runs have saved, read with the schema of each group."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from avn.core.errors import UserError
 
 
 def read_config(folder: Path) -> DictConfig:
-    """The config of a finished run, `outputs/eval/<agent>/<sounds>/<run>/config.yaml`.
+    """Read the config of a finished run, `outputs/eval/<agent>/<sounds>/<run>/config.yaml`.
 
     Raises
     ------
     UserError
-        Where there is none, or it is not one of this version of avn.
+        Where there is none, or it does not fit this version of avn.
     """
     path = folder.resolve() / "config.yaml"
     if not path.is_file():
@@ -30,7 +30,7 @@ def read_config(folder: Path) -> DictConfig:
     try:
         cfg = _typed(OmegaConf.load(path))
         if len(path.parents) > 4 and path.parents[3].name == "eval":
-            cfg.outputs = str(path.parents[4])  # wherever the outputs have been moved to since
+            cfg.outputs = str(path.parents[4])  # the outputs may have been moved since
     except (OmegaConfBaseException, OSError, ValueError, KeyError, IndexError) as error:
         line = " ".join(str(error).split())
         raise UserError(f"{path}: not a config of this avn ({line}); run avn.eval again") from error
@@ -38,7 +38,7 @@ def read_config(folder: Path) -> DictConfig:
 
 
 def _typed(plain: Any) -> DictConfig:
-    """A config as it was composed, with the schema of each group; what is new has its default."""
+    """Return a saved config with the schema of each group; new keys have their defaults."""
     registry.register()
     if GlobalHydra.instance().is_initialized():
         cfg = compose("eval")
@@ -54,23 +54,23 @@ def _typed(plain: Any) -> DictConfig:
 
 
 def _with_schema(group: str, node: DictConfig, default: DictConfig) -> DictConfig:
-    """A group's node with its schema."""
+    """Return a group's node with its schema."""
     if is_option(group, node):
         return with_signature(group, node)
     if group == "training":
         return _training(node, default)
     if group in schema.SCHEMAS:
         return OmegaConf.merge(OmegaConf.structured(schema.SCHEMAS[group]), node)  # type: ignore
-    if OmegaConf.get_type(default) is dict:  # of names and paths, which are the file's alone
+    if OmegaConf.get_type(default) is dict:  # sounds: the defaults are not merged in
         return node
     return OmegaConf.merge(default, node)  # type: ignore[return-value]
 
 
 def _training(node: DictConfig, default: DictConfig) -> DictConfig:
-    """The node of the training world; its sounds are the file's alone."""
-    own, merged = node.copy(), default.copy()
+    """Return the node of the training world; default sounds are not merged into its sounds."""
+    node, merged = node.copy(), default.copy()
     for key in ("microphone", "sounds"):
-        value = own.pop(key, default[key])
+        value = node.pop(key, default[key])
         typed = with_signature(key, value) if is_option(key, value) else value
         OmegaConf.update(merged, key, typed, merge=False)
-    return OmegaConf.merge(merged, own)  # type: ignore[return-value]
+    return OmegaConf.merge(merged, node)  # type: ignore[return-value]

@@ -1,7 +1,7 @@
-"""What Hydra must know before it composes: the schema of each command and of each group.
+"""Schemas of the commands' configs and of the config groups.
 
-A misspelt key or a wrong type is refused with its name. The settings of a class stand in its
-signature, see `avn.config.signatures`; here is what the options of a group have in common.
+Hydra refuses misspelt keys and wrong types by them. The settings of a class are the parameters of
+its constructor, see `avn.config.signatures`; the schemas here are common to all options of a group.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _TEST_ACOUSTICS: Any = II("acoustics")
 
 @dataclass
 class Option:
-    """What an option of any group has: the class that it is of, null for none.
+    """Option of a config group.
 
     Attributes
     ----------
     _target_ : str or None
-        Module and name of the class.
+        Module and name of the class that the option builds; null for none.
     """
 
     _target_: str | None = None
@@ -35,12 +35,12 @@ class Option:
 
 @dataclass
 class NamedOption(Option):
-    """An option with a name, for titles and folders.
+    """Option with a name, for titles and folders.
 
     Attributes
     ----------
     name : str
-        What the option is called.
+        Name of the option.
     """
 
     name: str = MISSING
@@ -48,14 +48,15 @@ class NamedOption(Option):
 
 @dataclass
 class MapperOption(NamedOption):
-    """What every option of the group `mapper` has.
+    """Option of the group `mapper`.
 
     Attributes
     ----------
     size : int
-        Squares along each side of the map, odd.
+        Side of the map in cells, an odd number.
     visible_above : float
-        Squares that are visible with a lower probability tell nothing of being free.
+        Minimum probability of being visible, 0 to 1, at which the occupancy estimate of a cell is
+        used.
     """
 
     size: int = 101
@@ -64,7 +65,7 @@ class MapperOption(NamedOption):
 
 @dataclass
 class ModelConfig:
-    """What `avn.train` trains.
+    """Model that `avn.train` trains.
 
     Attributes
     ----------
@@ -77,16 +78,16 @@ class ModelConfig:
 
 @dataclass
 class AgentConfig:
-    """A row of the table; a privileged one is shown the truth and is a bound, not an entry.
+    """Row of the results table.
 
     Attributes
     ----------
     name : str
-        Name of the row.
+        Name of the row, in tables and folders.
     privileged : bool
-        Whether the agent is shown the truth; the row has to say so.
+        Whether the agent has access to ground truth; such a row is a bound, not a competitor.
     oracle_inputs : list of str
-        Parts in whose place it is given the truth: `source_estimate`, `local_patch`, `map`, `pose`.
+        Inputs that are replaced by ground truth: `source_estimate`, `local_patch`, `map`, `pose`.
     """
 
     name: str = MISSING
@@ -96,20 +97,20 @@ class AgentConfig:
 
 @dataclass
 class TrainingConfig:
-    """The world in which networks are trained: apartments, acoustics, microphone and sounds.
+    """Training world: the apartments, acoustics, microphone and sounds that networks train on.
 
-    Apartments and acoustics are those of the test world, unless they are chosen.
+    Apartments and acoustics are those of the test world unless they are set.
 
     Attributes
     ----------
     scenes : SplitConfig
-        The split of the training world, an option of `split`.
+        Split of the training world, an option of `split`.
     acoustics : AcousticsConfig
-        The acoustics of the training world, an option of `acoustics`.
+        Acoustics of the training world, an option of `acoustics`.
     microphone : Option
-        The microphone of the training world, an option of `microphone`.
+        Microphone of the training world, an option of `microphone`.
     sounds : dict of str to str
-        The sounds of the training world, an option of `sound`.
+        Sounds of the training world, an option of `sound`.
     """
 
     scenes: SplitConfig = _TEST_SPLIT
@@ -120,12 +121,12 @@ class TrainingConfig:
 
 @dataclass
 class CoreConfig:
-    """What every command has: the groups, and machine settings.
+    """Settings of all commands: the config groups and machine settings.
 
     Attributes
     ----------
     sound : dict of str to str
-        For each name of a sound the recording: one that the package ships, or a file's path.
+        Recording of each sound by its name: a built-in recording or the path of an audio file.
     """
 
     split: SplitConfig = MISSING
@@ -167,7 +168,7 @@ class TrainConfig(CoreConfig):
     """Schema of `train.yaml`."""
 
     model: ModelConfig = MISSING
-    # The row whose agent is trained, for `model=a3c_v` and the like.
+    # Row whose agent is trained, for `model=a3c_v` and the like.
     agent: AgentConfig = field(default_factory=lambda: AgentConfig(name="none"))
 
 
@@ -193,7 +194,7 @@ class ReproduceConfig(CoreConfig):
     train_seeds: list[int] = MISSING
 
 
-# What every option of a group has.
+# Schema that all options of a group share.
 BASES: dict[str, type] = {
     "sound_model": NamedOption,
     "stop_model": NamedOption,
@@ -207,18 +208,18 @@ BASES: dict[str, type] = {
     "renderer": RendererConfig,
     "backbone": BackboneConfig,
 }
-# Parameters that the pipeline gives, and no config.
+# Parameters that the pipeline sets and no config.
 GIVEN = {
     "sound_model": ("rate",),
     "stop_model": ("rate",),
     "occupancy_model": ("camera",),
     "planner": ("mapper", "oracle_inputs", "stop_at"),
     "baseline": ("network", "hears", "maps", "map_size"),
-    # of the part of a network that has this key
+    # of the submodule of a network under this key
     "spectrogram": ("rate",),
     "net": ("channels", "height", "width", "outputs", "camera"),
 }
-# Parameters that follow the setting of the same name, unless they are given.
+# Parameters whose default is the setting of the same name.
 LINKED = {name: II(name) for name in ("train_seed", "look", "localisation")}
 COMMANDS = {
     "generate": GenerateConfig,
@@ -226,5 +227,5 @@ COMMANDS = {
     "eval": EvalConfig,
     "reproduce": ReproduceConfig,
 }
-# Groups whose options are values of one dataclass.
+# Groups whose options are instances of one dataclass.
 SCHEMAS = {"split": SplitConfig, "acoustics": AcousticsConfig}

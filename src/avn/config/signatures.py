@@ -1,9 +1,8 @@
-"""Schemas of the options of config groups, read from the signatures of the classes they name.
+"""Schemas of config options, derived from the constructors of the classes that they name.
 
-An option names a class with `_target_`. What every option of its group has is a dataclass in
-`avn.config.schema.BASES`; the parameters of the class come on top, with their types and defaults.
-So a setting stands in one place, the class that uses it, and a class from outside the package
-brings its own.
+An option names a class with `_target_`. Its schema has the fields of the group's dataclass in
+`avn.config.schema.BASES` and the parameters of the class, with their types and defaults. So a
+setting is declared once, in the class that uses it, also for classes outside the package.
 """
 
 from __future__ import annotations
@@ -29,18 +28,19 @@ _TARGET = "_target_"
 
 
 def is_option(group: str, node: object) -> bool:
-    """Whether a node is one of a group that has a schema, and says which class it is of."""
+    """Return whether a node names a class and its group has a schema."""
     return group in BASES and isinstance(node, DictConfig) and _TARGET in node
 
 
 def with_signature(group: str, node: DictConfig) -> DictConfig:
-    """A group's node, typed by the signature of the class that it names.
+    """Return a group's node, typed by the constructor of the class that it names.
 
     Parameters
     ----------
     group : str
+        Name of the config group.
     node : DictConfig
-        With `_target_`, which may be null: then it has what every option of the group has.
+        Option with `_target_`; where that is null, the schema is that of the group.
 
     Raises
     ------
@@ -57,15 +57,15 @@ def with_signature(group: str, node: DictConfig) -> DictConfig:
 
 
 def _part(typed: DictConfig, node: DictConfig, key: str) -> DictConfig | None:
-    """The node of a part that the class builds itself, where it names the part's class."""
+    """Return the node of a submodule that the class builds itself, None where there is none."""
     if OmegaConf.is_missing(typed, key) or OmegaConf.is_interpolation(typed, key):
         return None
     value = typed[key]
     if not isinstance(value, DictConfig) or dataclasses.is_dataclass(OmegaConf.get_type(value)):
         return None
-    own = node.get(key)
-    # what is given for one class means nothing to another
-    part = own if isinstance(own, DictConfig) and _TARGET in own else value
+    given = node.get(key)
+    # settings of one class do not apply to another
+    part = given if isinstance(given, DictConfig) and _TARGET in given else value
     return part if _TARGET in part else None
 
 
@@ -81,7 +81,7 @@ def _merged(where: str, schema: Any, node: DictConfig) -> DictConfig:
 
 
 def schema_of(group: str, target: str | None) -> Any:
-    """The dataclass of an option: what every option of the group has, and the class's parameters.
+    """Return the dataclass of an option: fields of the group and parameters of the class.
 
     Raises
     ------
@@ -100,15 +100,15 @@ def _signature(
     return _settings(cls, target, given, base, linked)
 
 
-@cache  # merging wants the same class for the same settings
+@cache  # OmegaConf merges only instances of the same class
 def _settings(cls: Any, target: str, given: tuple[str, ...], base: Any, linked: bool) -> Any:
-    own = parameters(cls)
-    if "cfg" in own and dataclasses.is_dataclass(own["cfg"][0]):
-        return own["cfg"][0]  # a renderer or a backbone says what its config is
+    known = parameters(cls)
+    if "cfg" in known and dataclasses.is_dataclass(known["cfg"][0]):
+        return known["cfg"][0]  # renderers and backbones take a dataclass
     inherited = {field.name for field in dataclasses.fields(base)} if base is not object else ()
     fields: list[Any] = [
         (name, _kind(hint), _field(hint, LINKED.get(name, default) if linked else default))
-        for name, (hint, default) in own.items()
+        for name, (hint, default) in known.items()
         if name not in given and (name not in inherited or isinstance(default, _PLAIN))
     ]
     fields.append((_TARGET, str, dataclasses.field(default=target)))
@@ -132,12 +132,12 @@ def _field(hint: Any, default: Any) -> Any:
 
 
 def _kind(hint: Any) -> Any:
-    """The type as a config can hold it; anything where it is no plain one."""
+    """Return the type as OmegaConf supports it, else `Any`."""
     if hint in _PLAIN or dataclasses.is_dataclass(hint):
         return hint
     arguments = typing.get_args(hint)
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
-        known = [kind for own in arguments if (kind := _kind(own)) is not Any]
+        known = [kind for argument in arguments if (kind := _kind(argument)) is not Any]
         if len(known) != 1:
             return Any
         optional = type(None) in arguments and not dataclasses.is_dataclass(known[0])

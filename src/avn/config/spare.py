@@ -1,8 +1,8 @@
-"""Settings of the command line that the chosen options do not have.
+"""Settings of the command line that do not exist in the selected options.
 
-`agent=greedy planner.collision_cost=9` sets something of a planner where there is none. Hydra
-cannot compose that, so such settings are set aside. The command refuses them by name; the rows of
-a table take those that their own options have.
+`agent=greedy planner.collision_cost=9` sets a key of a planner where there is none. Hydra cannot
+compose that, so such settings are set aside. A command refuses them by name; in a table, each row
+uses those that its options have.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from hydra.errors import ConfigCompositionException
 from omegaconf import DictConfig
 
 _UNKNOWN = re.compile(r"Could not override '([\w.]+)'")
-# Of the command line that is being run.
+# Settings of the current command line that were set aside.
 _spare: list[str] = []
 
 
@@ -25,65 +25,67 @@ def begin() -> None:
 
 
 def settings() -> Sequence[str]:
-    """What was set aside, as it was given."""
+    """Return the settings that were set aside, as given."""
     return tuple(_spare)
 
 
 def set_aside(arguments: list[str], error: BaseException, everything: bool) -> bool:
-    """Move the setting that an error is about from the arguments to what is set aside.
+    """Remove the setting that an error is about from the arguments and set it aside.
 
     Parameters
     ----------
     arguments : list of str
-        The command line, which loses the setting.
+        Command line; the setting is removed in place.
     error : BaseException
-        What composing raised.
+        Error of composing the config.
     everything : bool
-        Whether a setting that a chosen option does not have is set aside as well; else those alone
-        whose group is `none`.
+        Whether any setting that the selected option lacks is set aside; otherwise only settings
+        of groups whose option is `none`.
 
     Returns
     -------
     bool
         Whether there was such a setting.
     """
-    found = _told(arguments, error, everything)
-    if found is None:
+    unknown = _unknown_setting(arguments, error, everything)
+    if unknown is None:
         return False
-    arguments.remove(found)
-    _spare.append(found)
+    arguments.remove(unknown)
+    _spare.append(unknown)
     return True
 
 
 def compose_fitting(command: str, overrides: Sequence[str]) -> DictConfig:
-    """Compose a config with those overrides that its options have.
+    """Compose a config with those overrides that exist in its options.
 
     Parameters
     ----------
     command : str
-        The name of the config.
+        Name of the config.
     overrides : sequence of str
-        Settings of groups that the chosen options do not have are left out.
+        Overrides; settings that the selected options lack are left out.
     """
     kept = list(overrides)
     while True:
         try:
             return compose(command, overrides=kept)
         except ConfigCompositionException as error:
-            found = _told(kept, error, everything=True)
-            if found is None:
+            unknown = _unknown_setting(kept, error, everything=True)
+            if unknown is None:
                 raise
-            kept.remove(found)
+            kept.remove(unknown)
 
 
-def _told(arguments: Sequence[str], error: BaseException, everything: bool) -> str | None:
-    """The argument whose setting an option does not have."""
-    if (told := _UNKNOWN.search(str(error))) is None:
+def _unknown_setting(
+    arguments: Sequence[str], error: BaseException, everything: bool
+) -> str | None:
+    """Return the argument whose key the selected option lacks, None where there is none."""
+    if (match := _UNKNOWN.search(str(error))) is None:
         return None
-    from avn.config.schema import BASES  # imports torch, which help does without
+    from avn.config.schema import BASES  # imports torch, which help does not need
 
-    key, cause = told[1], str(error.__cause__ or error)
+    key, cause = match[1], str(error.__cause__ or error)
     group = key.split(".")[0]
     if group not in BASES or not (everything or f"'{BASES[group].__name__}'" in cause):
         return None
-    return next((own for own in arguments if own.split("=")[0] == key), None)
+    return next((given for given in arguments if given.split("=")[0] == key), None)

@@ -1,6 +1,6 @@
-"""Sweeps: each job leaves a record, and the end of the sweep sums them up.
+"""Sweeps: each job writes a record, and the end of the sweep summarises them.
 
-The records go through files, because a launcher may run its jobs in other processes.
+Records are files, because a launcher may run its jobs in other processes.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _RECORDS = "AVN_SWEEP_RECORDS"
 
 
 def begin() -> None:
-    """Open a place for the records of a sweep; the jobs' processes inherit it."""
+    """Create the folder of a sweep's records; processes of jobs inherit its path."""
     os.environ[_RECORDS] = tempfile.mkdtemp(prefix="avn-sweep-")
 
 
@@ -37,7 +37,17 @@ def run_job(
     cfg: DictConfig,
     explain: Callable[[BaseException], str | None],
 ) -> None:
-    """Run one job of a sweep and record how it ended, so that a failure stops no other job."""
+    """Run one job of a sweep and record its result, so that a failure stops no other job.
+
+    Parameters
+    ----------
+    task : callable
+        Function of the config; gives the folder of its results.
+    cfg : DictConfig
+        Config of the job.
+    explain : callable
+        Function from an exception to a one-line message, None for an internal error.
+    """
     job = HydraConfig.get().job
     overrides = list(HydraConfig.get().overrides.task)
     record: dict[str, Any] = {"overrides": ", ".join(overrides), "folder": None, "error": None}
@@ -57,7 +67,7 @@ def run_job(
 
 
 def end(name: str) -> int:
-    """Print the mean and spread of a sweep and name the jobs that failed; give the exit code."""
+    """Print mean and standard deviation of a sweep and the failed jobs; return the exit code."""
     folder = Path(os.environ[_RECORDS])
     records = [json.loads(path.read_text()) for path in sorted(folder.iterdir())]
     failed = [record for record in records if record["error"]]
@@ -78,13 +88,13 @@ def end(name: str) -> int:
 
 
 def forget() -> None:
-    """Remove the records of a sweep, however it ended."""
+    """Remove the records of a sweep."""
     if folder := os.environ.pop(_RECORDS, None):
         shutil.rmtree(folder)
 
 
 def _spread(records: list[dict[str, Any]]) -> pd.DataFrame:
-    """Mean and spread over the seeds, apart for jobs that differ in anything else."""
+    """Return mean and standard deviation over seeds, for each setting of the other keys."""
     tables: dict[str, list[pd.DataFrame]] = {}
     for record in records:
         path = Path(record["folder"] or "") / "results.csv"

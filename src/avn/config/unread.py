@@ -1,4 +1,4 @@
-"""Refuses settings of the command line that nothing of a command reads."""
+"""Refusal of command-line settings that a command does not read."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from avn.config import spare
 from avn.core.errors import UserError
 from avn.core.settings import leaves, plain
 
-# Groups that choose what a command does; the defaults of their options are no one's mistake.
+# Groups that select what a command does; they may set keys that it does not read.
 _CHOOSE = ("agent", "model", "experiment")
 
 
@@ -24,15 +24,16 @@ def refuse_unread(command: str, cfg: DictConfig, read: Collection[str]) -> None:
     Parameters
     ----------
     command : str
-        The name of its config.
+        Name of the command's config.
     cfg : DictConfig
+        Composed config.
     read : collection of str
-        Dotted keys of the leaves that it reads.
+        Dotted keys of the leaves that the command reads.
 
     Raises
     ------
     UserError
-        Naming the override, and all settings that are read.
+        For such an override; the message lists the settings that are read.
     """
     for setting in spare.settings():
         if (key := setting.split("=")[0]) not in read:
@@ -45,7 +46,7 @@ def refuse_unread(command: str, cfg: DictConfig, read: Collection[str]) -> None:
     ]
     if not suspects:
         return
-    chosen = [own for own in given if own.split("=")[0] in _CHOOSE]
+    chosen = [override for override in given if override.split("=")[0] in _CHOOSE]
     default = compose(command, overrides=chosen)
     for override in suspects:
         key = _key(override)
@@ -67,16 +68,16 @@ def _key(override: Override) -> str:
 
 
 def summary(cfg: DictConfig, read: Collection[str]) -> list[str]:
-    """The settings that are read: whole nodes by their name, with what is left out of them."""
+    """Return the settings that are read: whole nodes by name, with their unread keys."""
     return [text for name in sorted(map(str, cfg)) for text in _summary(cfg, name, set(read))]
 
 
 def _summary(cfg: DictConfig, key: str, read: set[str]) -> Iterable[str]:
-    every = {leaf for leaf in leaves(cfg, [key]) if leaf == key or leaf.startswith(f"{key}.")}
-    here, others = sorted(every & read), sorted(every - read)
-    if here and not others:
+    below = {leaf for leaf in leaves(cfg, [key]) if leaf == key or leaf.startswith(f"{key}.")}
+    known, unread = sorted(below & read), sorted(below - read)
+    if known and not unread:
         yield key
-    elif len(others) < len(here):
-        yield f"{key} (but for {', '.join(leaf[len(key) + 1 :] for leaf in others)})"
+    elif len(unread) < len(known):
+        yield f"{key} (but for {', '.join(leaf[len(key) + 1 :] for leaf in unread)})"
     else:
-        yield from here
+        yield from known

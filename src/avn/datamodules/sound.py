@@ -145,7 +145,7 @@ class SoundData(L.LightningDataModule):
             )
         if recipe.batch < 1 or recipe.validation_clips < 1:
             raise UserError(f"{self.node}.batch and {self.node}.validation_clips must be 1 or more")
-        self.scenes = {"validation": list(validation), "training": list(train)}
+        self.scenes = {"validation": list(validation), "train": list(train)}
         self.sounds, self.recipe = sounds, recipe
         self.spectrogram: Spectrogram = build_part(recipe.spectrogram, self.node, rate=sounds.rate)
         # Number of threads that render, beside those of the network.

@@ -201,7 +201,7 @@ class ViewData(L.LightningDataModule):
         self.threads = 1
         seed = recipe.train_seed
         self.train_views = ViewSet(train, seed, recipe.augment, recipe.flip_augmentation)
-        self.measured_views = {"validation": ViewSet(validation), "training": ViewSet(train)}
+        self.measured_views = {"validation": ViewSet(validation), "train": ViewSet(train)}
 
     @property
     def prior(self) -> Tensor:

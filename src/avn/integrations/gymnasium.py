@@ -25,9 +25,9 @@ from avn.navigation.batched_episodes import BatchedEpisodes
 from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import SceneBatch
 from avn.navigation.start_sampler import build_start_sampler
-from avn.pipeline import policy
-from avn.pipeline.occupancy import sees_windows
-from avn.pipeline.sound_network import hears
+from avn.pipeline import policy, policy_data
+from avn.pipeline.occupancy import has_occupancy_model
+from avn.pipeline.sound_network import has_sound_model
 from avn.pipeline.stage import build
 from avn.rl.algorithm import Algorithm
 from avn.rl.environment import WalkEnv
@@ -162,13 +162,13 @@ def _tables(
 ) -> tuple[SceneBatch, tuple[str, ...], Protocol, Algorithm]:
     # many environments of one process look into the same tables
     cfg = _config(overrides)
-    if part not in policy.PARTS:
-        raise UserError(f"part: '{part}' is none of {', '.join(policy.PARTS)}")
-    for stage in policy.part_stages(cfg, part):
+    if part not in policy_data.SUBSETS:
+        raise UserError(f"part: '{part}' is none of {', '.join(policy_data.SUBSETS)}")
+    for stage in policy_data.subset_stages(cfg, part):
         build(stage)
-    tables = policy.tables_of(cfg, policy.load_part(cfg, part))
-    heard = ("audio_embedding",) if hears(cfg) else ()
-    names = ("visual_embedding", *heard, *(("map",) if sees_windows(cfg) else ()))
+    tables = policy_data.tables_of(cfg, policy_data.load_subset(cfg, part))
+    heard = ("audio_embedding",) if has_sound_model(cfg) else ()
+    names = ("visual_embedding", *heard, *(("map",) if has_occupancy_model(cfg) else ()))
     return tables, names, build_object("protocol", cfg.protocol), policy.build_algorithm(cfg)
 
 

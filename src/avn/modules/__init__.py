@@ -1,0 +1,1 @@
+"""Networks that are trained, their training recipes and metrics."""

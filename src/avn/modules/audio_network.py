@@ -1,4 +1,4 @@
-"""Base class of networks on clips: spectrograms, and the mean over a clip and its mirror image."""
+"""Base class of networks on binaural clips: spectrogram, flip augmentation, flip averaging."""
 
 from __future__ import annotations
 
@@ -13,10 +13,18 @@ from avn.modules.spectrogram import Spectrogram
 
 
 class ClipBatch(TypedDict):
-    """N clips and what is to be known about them.
+    """Batch of N clips with labels.
 
-    clips (N, 2, rate) float32; target (N, ...), what is to be heard; in_sight (N,) bool; sound
-    (N,) int64.
+    Attributes
+    ----------
+    clips : (N, 2, rate) float32 tensor
+        Waveforms of the left and the right ear.
+    target : (N, ...) tensor
+        Label of each clip.
+    in_sight : (N,) bool tensor
+        Whether the source is in the line of sight.
+    sound : (N,) int64 tensor
+        Index of the sound.
     """
 
     clips: Tensor
@@ -26,7 +34,15 @@ class ClipBatch(TypedDict):
 
 
 class PictureBatch(TypedDict):
-    """The same of N clips as pictures (N, channels, bands, frames) float32."""
+    """Batch of N clips as spectrograms, with labels.
+
+    Attributes
+    ----------
+    pictures : (N, channels, bands, frames) float32 tensor
+        Spectrograms.
+    target, in_sight, sound
+        As those of `ClipBatch`.
+    """
 
     pictures: Tensor
     target: Tensor
@@ -39,44 +55,46 @@ FIVE_LAYERS: Part = {"_target_": "avn.modules.five_layer_cnn.FiveLayerCnn"}
 
 
 class AudioNetwork(Network):
-    """Network on spectrograms of two ears, with the symmetry of left and right.
+    """Network on spectrograms of two ears that uses left-right symmetry.
 
     Parameters
     ----------
     name : str
-        The option of the config group.
+        Name of the option.
     spectrogram : dict
         Config of the spectrogram, with `_target_`.
     net : dict
-        Config of the network behind it, with `_target_`.
+        Config of the network on the spectrogram, with `_target_`.
     optimizer : dict
         Config of the optimiser, with `_target_`.
     schedule : {"cosine", "constant"}
-        Learning rate over the epochs; "cosine" warms up over the first tenth and falls to 0.
+        Learning-rate schedule; "cosine" warms up over the first tenth of the steps and falls to 0.
     epochs : int
-        Length of the training.
+        Maximum number of epochs, 1 or more.
     patience : int
-        Epochs without progress after which training stops early.
+        Early stopping: epochs without a better monitored metric before training stops, 1 or more.
     batch : int
-        Clips in a batch; read by the data module.
+        Clips in a batch, 1 or more; read by the data module.
     flip_augmentation : bool
-        Shows half of the training clips with ears and locations mirrored, which is exact: the
-        head is symmetric and so is the world.
+        Whether each training clip is mirrored with probability 0.5: ears and target. This is exact,
+        as the head and the physics are symmetric.
     flip_tta : bool
-        Estimates as the mean over a clip and its mirror image, mirrored back.
+        Test-time augmentation: whether an estimate is the mean over a clip and its mirror image.
     train_seed : int
-        Draws the weights and all that is random in training.
+        Seed of the initial weights and of all randomness in training.
     sounds_per_pair : int
-        Sounds in which each pair of source and state is heard in an epoch; read by the data module.
+        Sounds with which an epoch has each pair of source and state, 1 to the number of sounds;
+        read by the data module.
     validation_clips : int
-        Most clips of each set of apartments on which it is measured; read by the data module.
+        Maximum number of clips of each subset on which metrics are computed, 1 or more; read by
+        the data module.
     rate : int
-        Sampling rate of the clips in Hz.
+        Sampling rate of the clips in hertz.
 
     Attributes
     ----------
     mirror_signs : tuple of float
-        Factor on each output of a clip when its ears are exchanged.
+        Factor on each output when the ears of a clip are exchanged.
     """
 
     unit = "clips"
@@ -115,11 +133,11 @@ class AudioNetwork(Network):
         self.net = built.to(memory_format=torch.channels_last)
 
     def forward(self, clips: Tensor) -> Tensor:
-        """(N, 2, rate) float32 clips to (N, outputs)."""
+        """Map clips (N, 2, rate) float32 to outputs (N, outputs) float32."""
         return self.estimate(self.spectrogram(clips))
 
     def estimate(self, pictures: Tensor) -> Tensor:
-        """(N, channels, bands, frames) pictures to (N, outputs)."""
+        """Map spectrograms (N, channels, bands, frames) to outputs (N, outputs) float32."""
         if not self.flip_tta or self.training:
             return self._net(pictures)
         both = torch.cat((pictures, self.spectrogram.mirror(pictures)))
@@ -127,22 +145,25 @@ class AudioNetwork(Network):
         return (straight + mirrored * mirrored.new_tensor(self.mirror_signs)) / 2
 
     def random_flip(self, pictures: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
-        """Mirror a random half of pictures and targets (N, outputs), where the recipe says so."""
+        """Mirror spectrograms and targets (N, outputs) with probability 0.5 each.
+
+        Without `flip_augmentation` nothing is mirrored.
+        """
         if not self.flip_augmentation:
             return pictures, target
-        chosen = torch.rand(len(target)).lt(0.5).to(target.device)
+        flipped = torch.rand(len(target)).lt(0.5).to(target.device)
         mirrored = self.spectrogram.mirror(pictures)
-        pictures = torch.where(chosen[:, None, None, None], mirrored, pictures)
+        pictures = torch.where(flipped[:, None, None, None], mirrored, pictures)
         signs = target.new_tensor(self.mirror_signs)
-        return pictures, torch.where(chosen[:, None], target * signs, target)
+        return pictures, torch.where(flipped[:, None], target * signs, target)
 
     def _net(self, pictures: Tensor) -> Tensor:
         return self.net(pictures.contiguous(memory_format=torch.channels_last))
 
     def prepare(self, data: Any) -> None:
-        """Take the names of the sounds, by which the metrics are told apart."""
+        """Set the names of the sounds from the data module; metrics are grouped by them."""
         self.name_sounds(data.sounds.names)
 
     def name_sounds(self, sounds: Any) -> None:
-        """Say what the sounds of the batches are called."""
+        """Set the names of the sounds, by index."""
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""The network behind what listens: five convolutions, dense layers, a few numbers."""
+"""Convolutional network on spectrograms with a small output vector."""
 
 from __future__ import annotations
 
@@ -10,29 +10,35 @@ from avn.core.errors import UserError
 
 
 class FiveLayerCnn(nn.Module):
-    """Convolutions of 3 x 3 that each halve the picture, then dense layers to a few numbers.
+    """CNN of 3 x 3 convolutions that each halve the resolution, followed by dense layers.
 
-    Each layer is convolution, ReLU, halving and batch normalisation. Sizes 64-128-256-512-512
+    Each block is convolution, ReLU, downsampling and batch normalisation. Widths 64-128-256-512-512
     with max-pooling, dense layers 4096-1000 and tanh are those of the code released with Gan et
     al., "Look, Listen, and Act" (ICRA 2020).
 
     Parameters
     ----------
     channels, height, width : int
-        Shape of the pictures.
+        Shape of the input.
     widths : sequence of int
-        Channels of each convolution.
+        Output channels of each convolution, 1 or more each.
     hidden : sequence of int
-        Sizes of the dense layers before the output.
+        Sizes of the dense layers before the output layer, 1 or more each.
     pool : {"stride", "max"}
-        Halving by a convolution of stride 2, or by max-pooling after one of stride 1.
+        Downsampling: convolution of stride 2, or stride 1 followed by max-pooling.
     tanh : bool
-        Whether tanh bounds the output to +-`output_scale`.
+        Whether tanh bounds the outputs to +-`output_scale`.
     dropout : float
-        Share of inputs of each dense layer that training silences.
+        Dropout probability before each dense layer, 0 or more and less than 1.
     output_scale : float
-        Factor on the outputs; for locations, metres.
+        Factor on the outputs, more than 0; in metres where the outputs are a location.
     outputs : int
+        Number of outputs.
+
+    Raises
+    ------
+    UserError
+        Where a parameter is out of range or the input is too small for the number of halvings.
     """
 
     def __init__(
@@ -80,13 +86,13 @@ class FiveLayerCnn(nn.Module):
         self.layers = nn.Sequential(*layers)
 
     def forward(self, pictures: Tensor) -> Tensor:
-        """(N, channels, height, width) pictures to (N, outputs)."""
+        """Map inputs (N, channels, height, width) to outputs (N, outputs)."""
         return self.layers(pictures) * self.output_scale
 
     def hidden(self, pictures: Tensor) -> Tensor:
-        """What the last dense layer is given, (N, `hidden_size`)."""
+        """Return the input of the output layer, (N, `hidden_size`)."""
         return self.layers[: self._answer](pictures)
 
     def answer(self, hidden: Tensor) -> Tensor:
-        """What `forward` gives, (N, outputs), from what `hidden` gave."""
+        """Apply the output layer to the result of `hidden`; gives (N, outputs) as `forward`."""
         return self.layers[self._answer :](hidden) * self.output_scale

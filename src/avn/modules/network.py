@@ -1,4 +1,4 @@
-"""What every network shares: the recipe that trains it, its seeds, and what it measured."""
+"""Base class of trainable networks: training recipe, seeding, logged metrics."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from torch.optim.lr_scheduler import LambdaLR
 from avn.core.classes import build_part
 from avn.core.errors import UserError
 
-# The two sets of apartments on which a network in training is measured, in this order.
-SPLITS = ("validation", "training")
+# Subsets of the split on which metrics are computed after each epoch, in the order of loaders.
+SUBSETS = ("validation", "train")
 
 
-# The config of a part that a network builds: `_target_` and arguments of that class.
+# Config of a submodule: `_target_` and arguments of that class.
 Part = dict[str, Any]
 
 
 @dataclass
 class OptimizerConfig:
-    """Optimiser of a network: any class of torch.optim that takes these two.
+    """Optimiser: a class of torch.optim that takes `lr` and `weight_decay`.
 
     Attributes
     ----------
     _target_ : str
-        Module and name of the class.
+        Module and name of the optimiser's class.
     lr : float
-        Learning rate.
+        Peak learning rate.
     weight_decay : float
-        Weight decay.
+        Weight decay coefficient.
     """
 
     _target_: str = "torch.optim.AdamW"
@@ -45,27 +45,27 @@ class OptimizerConfig:
 
 
 def as_part(config: Any) -> Part:
-    """A config as a plain dict, which a checkpoint can hold."""
+    """Return a config as a plain dict, which a checkpoint can hold."""
     return config if isinstance(config, dict) else dataclasses.asdict(config)
 
 
 class Network(L.LightningModule):
-    """A network with the recipe that trains it, as `avn.modules.training.fit` takes it.
+    """Network with a training recipe, as `avn.modules.training.fit` takes it.
 
     A subclass calls `save_hyperparameters`, then `check_recipe`, and builds `net`. Its batches are
-    dicts with a `target`. In `on_validation_epoch_end` it logs what it measured and keeps it in
-    `measured`, under the name `monitor` that by which checkpoints are chosen.
+    dicts with a `target`. In `on_validation_epoch_end` it passes its metrics to `keep`; one of them
+    is `monitor`, by which the best checkpoint is selected.
 
     Attributes
     ----------
     node : str
-        The node of the config that holds the recipe.
+        Config node that holds the recipe.
     what, unit : str
-        What it is called, and what its inputs are, for lines and bars.
+        Name of the network and of its inputs, for messages and progress bars.
     monitor, mode : str
-        The figure by which a checkpoint is chosen, and whether "min" or "max" is best.
-    measured : dict
-        The figures after the last epoch.
+        Metric by which the best checkpoint is selected, and whether "min" or "max" is best.
+    measured : dict of str to float
+        Metrics after the last epoch.
     """
 
     node: ClassVar[str]
@@ -81,7 +81,7 @@ class Network(L.LightningModule):
         self.measured: dict[str, float] = {}
 
     def check_recipe(self) -> None:
-        """Raise `UserError` where the recipe's lengths or its schedule cannot work."""
+        """Raise `UserError` for an unknown schedule or a length below 1."""
         schedule = self.hparams["schedule"]
         if schedule not in ("cosine", "constant"):
             raise UserError(f"{self.node}.schedule is '{schedule}'; give cosine or constant")
@@ -90,25 +90,28 @@ class Network(L.LightningModule):
                 raise UserError(f"{self.node}.{key} is {self.hparams[key]}; give at least 1")
 
     def build(self, key: str, **given: Any) -> Any:
-        """Build the part of the recipe under `key`; the weights are drawn from `train_seed`."""
+        """Build the submodule that the recipe describes under `key`.
+
+        The initial weights are drawn from `train_seed`.
+        """
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(self.hparams["train_seed"])
             return build_part(self.hparams[key], self.node, **given)
 
     def prepare(self, data: Any) -> None:
-        """Learn of the data module what the metrics need, before training."""
+        """Read what the metrics need from the data module, before training."""
 
     def on_train_epoch_start(self) -> None:
-        """Draw all that is random from the epoch, so that a resumed run goes on exactly."""
+        """Seed the epoch from `train_seed` and its number, so that a resumed run is identical."""
         torch.manual_seed(self.hparams["train_seed"] * 1_000_003 + self.current_epoch)
 
     def keep(self, values: dict[str, Any]) -> None:
-        """Log figures and keep them as `measured`."""
+        """Log metrics and keep them in `measured`."""
         self.log_dict(values)
         self.measured |= {name: float(value) for name, value in values.items()}
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
-        """The optimiser of the recipe; the rate follows `schedule` step by step."""
+        """Build the optimiser of the recipe, with `schedule` applied at every step."""
         learnt = [weight for weight in self.net.parameters() if weight.requires_grad]
         optimizer = build_part(self.hparams["optimizer"], self.node, params=learnt)
         steps = int(self.trainer.estimated_stepping_batches)
@@ -120,9 +123,10 @@ class Network(L.LightningModule):
 
 
 def rate_factor(schedule: str, steps: int) -> Callable[[int], float]:
-    """Factor on the learning rate at each step of a training of `steps` steps.
+    """Return the function from step to learning-rate factor, for a training of `steps` steps.
 
-    "constant" is 1; "cosine" rises over the first tenth and falls to 0.
+    "constant" is 1; "cosine" is a linear warm-up over the first tenth of the steps, then a cosine
+    decay to 0.
     """
     if schedule == "constant":
         return lambda step: 1.0

@@ -1,4 +1,4 @@
-"""The occupancy network: which of the cells ahead are free, from one picture."""
+"""Occupancy network: probabilities that the cells ahead are free, from one RGB view."""
 
 from __future__ import annotations
 
@@ -9,17 +9,25 @@ from torch import Tensor, nn
 from torchmetrics import MeanMetric
 
 from avn.core.errors import UserError
-from avn.modules.network import SPLITS, Network, OptimizerConfig, Part, as_part
+from avn.modules.local_patch_metrics import LocalPatchScores, calibrated, calibration
+from avn.modules.network import SUBSETS, Network, OptimizerConfig, Part, as_part
 from avn.modules.view_augment import AugmentConfig
-from avn.modules.window_metrics import WindowScores, calibrated, calibration
 from avn.views.camera import CameraConfig
 
 
 class ViewBatch(TypedDict):
-    """N views and what is to be known about them.
+    """Batch of N views with labels.
 
-    pictures (N, 3, H, W) float32, 0 to 1; target (N, 5, 5) float32, 1 for free; visible (N, 5, 5)
-    bool; inverse_depth (N, 1, H / 4, W / 4) float32, 1 / metres, 0 where there is nothing.
+    Attributes
+    ----------
+    pictures : (N, 3, H, W) float32 tensor
+        RGB, 0 to 1.
+    target : (N, 5, 5) float32 tensor
+        1 where a cell is free, else 0.
+    visible : (N, 5, 5) bool tensor
+        Whether the camera sees any of a cell.
+    inverse_depth : (N, 1, H / 4, W / 4) float32 tensor
+        1 / metres; 0 where there is no surface.
     """
 
     pictures: Tensor
@@ -32,39 +40,48 @@ WINDOW_NET: Part = {"_target_": "avn.modules.window_net.WindowNet"}
 
 
 class OccupancyCnn(Network):
-    """Network and the recipe that trains it.
+    """Occupancy network: classifies the 5 x 5 cells ahead as free or occupied from one RGB view.
 
     Parameters
     ----------
     name : str
-        What the recipe is called.
-    net, optimizer : dict
-        Configs with `_target_`, as plain dicts.
+        Name of the option.
+    net : dict
+        Config of the network, with `_target_`.
+    optimizer : dict
+        Config of the optimiser, with `_target_`.
     augment : dict
-        An `AugmentConfig` as a plain dict, read by the data module.
-    schedule, epochs, patience, batch, train_seed
-        As those of `avn.modules.sound_cnn.SoundCnn`.
+        Config of the image augmentation, an `AugmentConfig`; read by the data module.
+    schedule, epochs, patience, train_seed
+        As those of `avn.modules.audio_network.AudioNetwork`.
+    batch : int
+        Views in a batch, 1 or more; read by the data module.
     appearances : int
-        In how many looks (furniture models, patterns, light) training apartments are shown; read
-        by the data module.
+        Number of appearances (furniture models, textures, light) in which the training apartments
+        are rendered, 1 or more.
     times : int
-        How often a view is shown in an epoch, changed anew each time; read by the data module.
+        Number of times that an epoch shows each view, augmented anew each time, 1 or more; read
+        by the data module.
     validation_views : int
-        On how many views of each split it is measured after each epoch; read by the data module.
+        Number of views of each subset on which metrics are computed after each epoch, 1 or more;
+        read by the data module.
     flip_augmentation : bool
-        Shows half of the training views mirrored, which is exact: so is the camera.
+        Whether each training view is mirrored with probability 0.5. This is exact, as the camera
+        is symmetric.
     flip_tta : bool
-        Estimates as the mean over a view and its mirror image, mirrored back.
+        Test-time augmentation: whether an estimate is the mean over a view and its mirror image.
     visible_only : bool
-        Whether only cells that can be seen are learned. If so, what it says of others is nothing
-        to go by; if not, it learns how likely a hidden cell is free.
+        Whether the loss is over visible cells only. The probabilities of hidden cells then mean
+        nothing; otherwise the network learns how likely a hidden cell is free.
     depth_weight : float
-        Weight of the error in depth (Eigen et al., NeurIPS 2014, in inverse metres here), learned
-        beside, from the depth images of the training apartments; 0 for none.
+        Weight of the auxiliary loss on inverse depth, 0 or more; 0 turns it off (depth as in Eigen
+        et al., NeurIPS 2014).
     scaled : bool
-        Whether log-odds get, after each epoch, the factor and the shift that fit the validation
-        apartments best (see `avn.modules.window_metrics.calibration`): a network that learned two
-        apartments is surer of others than it should be, and rooms differ in how full they are.
+        Whether log-odds are calibrated on the validation apartments after each epoch, by Platt
+        scaling (see `avn.modules.local_patch_metrics.calibration`). A network that is trained on
+        two apartments is overconfident in others.
+    camera : dict or None
+        Config of the camera, a `CameraConfig`; its defaults if None.
     """
 
     calibration: Tensor
@@ -112,26 +129,27 @@ class OccupancyCnn(Network):
         self.net: nn.Module = built.to(memory_format=torch.channels_last)
         self.register_buffer("calibration", torch.tensor(((1.0, 0.0), (1.0, 0.0))))
         self.training_loss = MeanMetric()
-        # Plain lists: they take what is already on the CPU and are no part of a checkpoint.
-        self.scores = [WindowScores() for _ in SPLITS]
+        # In a plain list metrics stay on the CPU and out of checkpoints.
+        self.scores = [LocalPatchScores() for _ in SUBSETS]
 
     def forward(self, views: Tensor) -> Tensor:
-        """Judge N views.
+        """Estimate occupancy and visibility of the cells ahead in N views.
 
         Parameters
         ----------
         views : (N, H, W, 3) uint8 tensor
+            RGB.
 
         Returns
         -------
         (N, 2, 5, 5) float32 tensor
-            Probabilities that each cell of the window is free, and that it is visible.
+            Calibrated probabilities that each cell is free, and that it is visible.
         """
         pictures = views.permute(0, 3, 1, 2).float() / 255
         return calibrated(self.log_odds(pictures), self.calibration)
 
     def log_odds(self, pictures: Tensor) -> Tensor:
-        """(N, 3, H, W) pictures, 0 to 1, to (N, 2, 5, 5) log-odds before calibration."""
+        """Map pictures (N, 3, H, W), 0 to 1, to uncalibrated log-odds (N, 2, 5, 5)."""
         if not self.flip_tta or self.training:
             return self._net(pictures)[0]
         straight, mirrored = self._net(torch.cat((pictures, pictures.flip(-1))))[0].chunk(2)
@@ -142,7 +160,7 @@ class OccupancyCnn(Network):
         return self.net(centred.contiguous(memory_format=torch.channels_last))
 
     def training_step(self, batch: ViewBatch, index: int) -> Tensor:
-        """Cross-entropies of free and visible cells, and the error of the inverse depth."""
+        """Return the loss: cross-entropies of free and visible, and the inverse-depth error."""
         log_odds, inverse_depth = self._net(batch["pictures"])
         visible = batch["visible"].float()
         loss = self._free_loss(log_odds[:, 0], batch["target"], visible)
@@ -162,25 +180,35 @@ class OccupancyCnn(Network):
         return (each * visible).sum() / visible.sum().clamp_min(1.0)
 
     def on_train_epoch_end(self) -> None:
-        """Log the loss that the epoch's steps saw (with dropout, on changed pictures)."""
+        """Log the mean training loss of the epoch (with dropout and augmentation)."""
         self.log("loss/steps", self.training_loss.compute() * 1.0)
         self.training_loss.reset()
 
     def validation_step(self, batch: ViewBatch, index: int, dataloader_idx: int = 0) -> None:
-        """Take in the answers to one batch of one of `SPLITS`."""
+        """Add one batch to the metrics of a subset.
+
+        Parameters
+        ----------
+        batch : ViewBatch
+            Views with labels.
+        index : int
+            Number of the batch; unused.
+        dataloader_idx : int
+            Index into `SUBSETS`.
+        """
         log_odds = self.log_odds(batch["pictures"]).cpu()
         target, visible = batch["target"].cpu(), batch["visible"].cpu()
         self.scores[dataloader_idx].update(log_odds, target, visible)
 
     def on_validation_epoch_end(self) -> None:
-        """Fit the calibration; log figures such as `auc/validation/visible`."""
+        """Fit the calibration and log metrics such as `auc/validation/visible`."""
         if self.scaled:
-            log_odds, free, visible = self.scores[0].answers()
-            chosen = visible if self.visible_only else torch.ones_like(visible)
-            self.calibration[0] = calibration(log_odds[:, 0][chosen], free[chosen])
+            log_odds, free, visible = self.scores[0].gathered()
+            used = visible if self.visible_only else torch.ones_like(visible)
+            self.calibration[0] = calibration(log_odds[:, 0][used], free[used])
             self.calibration[1] = calibration(log_odds[:, 1], visible.float())
-        for split, scores in zip(SPLITS, self.scores, strict=True):
+        for subset, scores in zip(SUBSETS, self.scores, strict=True):
             scores.calibration = self.calibration.cpu().clone()
-            found = scores.compute()
+            metrics = scores.compute()
             scores.reset()
-            self.keep({name.replace("/", f"/{split}/", 1): v for name, v in found.items()})
+            self.keep({name.replace("/", f"/{subset}/", 1): v for name, v in metrics.items()})

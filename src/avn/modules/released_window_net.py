@@ -1,4 +1,4 @@
-"""The sizes of the occupancy network in the code that the paper's authors released."""
+"""Occupancy network with the layer sizes of the code released by the paper's authors."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ OUTPUTS = 2
 
 
 class ReleasedWindowNet(nn.Module):
-    """Four convolutions, a layer of 200, three transposed convolutions, dense layers, a window.
+    """Encoder-decoder CNN with dense layers that output the local patch.
 
-    Sizes are those of the code released with Gan et al., "Look, Listen, and Act" (ICRA 2020).
-    What it leaves open is chosen here: strides of 2, an adaptive pool to 4 x 4 before the dense
-    layer, and a second window for what is visible. It has no depth.
+    Four convolutions, a bottleneck, three transposed convolutions and two dense layers, with the
+    sizes of the code released with Gan et al., "Look, Listen, and Act" (ICRA 2020). The release
+    leaves open the strides, which are 2 here, and the pooling before the bottleneck, to 4 x 4
+    here. The output for visible cells is added; there is none for depth.
 
     Parameters
     ----------
     camera : CameraConfig
-        Of no account here.
+        Not used.
     widths : sequence of 4 int
-        Channels of the convolutions.
+        Output channels of the convolutions, 1 or more each.
     decoder : int
-        Size of the layer between convolutions and transposed ones.
+        Size of the bottleneck, 1 or more.
     cell : int
-        Size of the last dense layer before the window.
+        Size of the last hidden dense layer, 1 or more.
     dropout : float
-        Share of inputs of the dense layers that training silences.
+        Dropout probability before each hidden dense layer.
     """
 
     def __init__(
@@ -71,6 +72,6 @@ class ReleasedWindowNet(nn.Module):
         self.layers = nn.Sequential(*layers)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """(N, 3, size, size) pictures to (N, 2, 5, 5) log-odds, and no depth."""
+        """Map pictures (N, 3, size, size) to log-odds (N, 2, 5, 5) and a scalar 0 for depth."""
         log_odds = self.layers(pictures)
         return log_odds, log_odds.new_zeros(())

@@ -1,4 +1,4 @@
-"""The sound network: where a sound comes from, in metres to the right and to the front."""
+"""Sound network: estimates the location of a source relative to the agent from one clip."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from torchmetrics import MeanSquaredError
 from avn.core.errors import UserError
 from avn.modules.audio_network import AudioNetwork, PictureBatch
 from avn.modules.five_layer_cnn import FiveLayerCnn
-from avn.modules.network import SPLITS
+from avn.modules.network import SUBSETS
 from avn.modules.sound_metrics import LocationErrors
 
 
 class SoundCnn(AudioNetwork):
-    """Sound network: estimates where the source of a clip is.
+    """Network that regresses the relative location of a clip's source.
 
     Parameters
     ----------
@@ -35,16 +35,17 @@ class SoundCnn(AudioNetwork):
     def __init__(self, **recipe: Any) -> None:
         super().__init__(**recipe)
         self.training_loss = MeanSquaredError()
-        # Plain lists: they take what is already on the CPU and are no part of a checkpoint.
-        self.losses = [MeanSquaredError() for _ in SPLITS]
+        # In plain lists metrics stay on the CPU and out of checkpoints.
+        self.losses = [MeanSquaredError() for _ in SUBSETS]
         self.errors: list[LocationErrors] = []
 
     def forward(self, clips: Tensor) -> Tensor:
-        """Hear N clips.
+        """Estimate the source locations of N clips.
 
         Parameters
         ----------
         clips : (N, 2, rate) float32 tensor
+            Waveforms of the left and the right ear.
 
         Returns
         -------
@@ -54,22 +55,23 @@ class SoundCnn(AudioNetwork):
         return super().forward(clips)
 
     def features(self, clips: Tensor) -> Tensor:
-        """What other networks learn from: the last hidden layer, and what the network says.
+        """Return audio embeddings: the last hidden layer and the estimated location.
 
         Parameters
         ----------
         clips : (N, 2, rate) float32 tensor
+            Waveforms of the left and the right ear.
 
         Returns
         -------
         (N, 2 * hidden + 2) float32 tensor
-            The hidden layer for the clip and for its mirror image, and the location in metres as
-            `forward` gives it for a network that is `symmetric`.
+            Hidden layer of the clip, hidden layer of its mirror image, and location in metres as
+            `forward` gives it with `flip_tta`.
 
         Raises
         ------
         UserError
-            Where the recipe's network is no `FiveLayerCnn`.
+            Where `net` is no `FiveLayerCnn`.
         """
         if not isinstance(self.net, FiveLayerCnn):
             raise UserError(f"sound_model.net: {type(self.net).__name__} gives no features")
@@ -81,11 +83,11 @@ class SoundCnn(AudioNetwork):
         return torch.cat((*hidden.chunk(2), location), dim=1)
 
     def name_sounds(self, sounds: Sequence[str]) -> None:
-        """Say what the sounds of the batches are called; the metrics are by these names."""
-        self.errors = [LocationErrors(sounds) for _ in SPLITS]
+        """Set the names of the sounds, by index; metrics are grouped by them."""
+        self.errors = [LocationErrors(sounds) for _ in SUBSETS]
 
     def training_step(self, batch: PictureBatch, index: int) -> Tensor:
-        """The mean square error in square metres, with half of the clips mirrored."""
+        """Return the mean squared error in square metres, after flip augmentation."""
         pictures, target = self.random_flip(batch["pictures"], batch["target"])
         estimate = self._net(pictures)
         loss = nn.functional.mse_loss(estimate, target)
@@ -93,24 +95,34 @@ class SoundCnn(AudioNetwork):
         return loss
 
     def on_train_epoch_end(self) -> None:
-        """Log the loss that the epoch's steps saw (with dropout, on fresh clips)."""
+        """Log the mean training loss of the epoch (with dropout and augmentation)."""
         self.log("loss/steps", self.training_loss.compute() * 1.0)
         self.training_loss.reset()
 
     def validation_step(self, batch: PictureBatch, index: int, dataloader_idx: int = 0) -> None:
-        """Take in the errors of one batch of one of `SPLITS`."""
+        """Add one batch to the metrics of a subset.
+
+        Parameters
+        ----------
+        batch : PictureBatch
+            Spectrograms with locations in metres.
+        index : int
+            Number of the batch; unused.
+        dataloader_idx : int
+            Index into `SUBSETS`.
+        """
         estimate, target = self.estimate(batch["pictures"]).cpu(), batch["target"].cpu()
         self.losses[dataloader_idx].update(estimate.flatten(), target.flatten())
         in_sight, sound = batch["in_sight"].cpu(), batch["sound"].cpu()
         self.errors[dataloader_idx].update(estimate, target, in_sight, sound)
 
     def on_validation_epoch_end(self) -> None:
-        """Log losses and medians, such as `error_m/validation/in_sight/ring`."""
-        for split, loss, errors in zip(SPLITS, self.losses, self.errors, strict=True):
-            values = {f"loss/{split}": loss.compute()}
+        """Log losses and median errors, such as `error_m/validation/in_sight/ring`."""
+        for subset, loss, errors in zip(SUBSETS, self.losses, self.errors, strict=True):
+            values = {f"loss/{subset}": loss.compute()}
             for name, value in errors.compute().items():
                 kind, group = name.split("/", 1)
-                values[f"{kind}/{split}/{group}"] = value
+                values[f"{kind}/{subset}/{group}"] = value
             loss.reset()
             errors.reset()
             self.keep(values)

@@ -1,4 +1,4 @@
-"""How far heard locations lie from true ones, in groups."""
+"""Errors of estimated source locations, grouped by sight and sound."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SIGHTS = ("in_sight", "out_of_sight")
 
 
 def location_errors(estimate: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
-    """Distance and angle between heard and true locations.
+    """Compute distance and bearing error between estimated and true locations.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def location_errors(estimate: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
     Returns
     -------
     metres, degrees : (...) float tensors
-        The angle lies in 0..180; it is 0 where either location is the agent's own place.
+        The bearing error is 0 to 180; it is 0 where either location is that of the agent.
     """
     metres = torch.linalg.vector_norm(estimate - target, dim=-1)
     cross = estimate[..., 0] * target[..., 1] - estimate[..., 1] * target[..., 0]
@@ -33,12 +33,12 @@ def location_errors(estimate: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class LocationErrors(Metric):
-    """Median error in metres and bearing error in degrees, in and out of sight, by sound.
+    """Median location error in metres and bearing error in degrees, by sight and sound.
 
     Parameters
     ----------
     sounds : sequence of str
-        Names of the sounds; `update` takes indices into it.
+        Names of the sounds, by index.
     """
 
     full_state_update = False
@@ -50,13 +50,16 @@ class LocationErrors(Metric):
             self.add_state(state, default=[], dist_reduce_fx="cat")
 
     def update(self, estimate: Tensor, target: Tensor, in_sight: Tensor, sound: Tensor) -> None:
-        """Take in N estimates.
+        """Add N estimates.
 
         Parameters
         ----------
-        estimate, target : (N, 2) float tensors, metres right and front
+        estimate, target : (N, 2) float tensors
+            Metres to the right and to the front.
         in_sight : (N,) bool tensor
-        sound : (N,) int64 tensor, index into the names
+            Whether the source is in the line of sight.
+        sound : (N,) int64 tensor
+            Index of the sound.
         """
         metres, degrees = location_errors(estimate, target)
         self.metres.append(metres)  # type: ignore[union-attr, operator]
@@ -65,9 +68,9 @@ class LocationErrors(Metric):
         self.sound.append(sound)  # type: ignore[union-attr, operator]
 
     def compute(self) -> dict[str, Tensor]:
-        """Medians by name, such as `error_m/in_sight/ring` or `bearing_deg/all/all`.
+        """Return medians by name, such as `error_m/in_sight/ring` or `bearing_deg/all/all`.
 
-        A group without any clip is left out.
+        Groups without clips are left out.
         """
         metres, degrees, in_sight, sound = (
             dim_zero_cat(getattr(self, state))
@@ -77,8 +80,8 @@ class LocationErrors(Metric):
         medians: dict[str, Tensor] = {}
         for sight, seen in sights.items():
             for index, name in enumerate((ALL, *self.sounds)):
-                chosen = seen if name == ALL else seen & (sound == index - 1)
-                if chosen.any():
-                    medians[f"error_m/{sight}/{name}"] = torch.quantile(metres[chosen], 0.5)
-                    medians[f"bearing_deg/{sight}/{name}"] = torch.quantile(degrees[chosen], 0.5)
+                group = seen if name == ALL else seen & (sound == index - 1)
+                if group.any():
+                    medians[f"error_m/{sight}/{name}"] = torch.quantile(metres[group], 0.5)
+                    medians[f"bearing_deg/{sight}/{name}"] = torch.quantile(degrees[group], 0.5)
         return medians

@@ -1,4 +1,4 @@
-"""From clips to the pictures that the sound network sees: pooled spectrograms of two ears."""
+"""Binaural log-power spectrograms with interaural coherence, the input of audio networks."""
 
 from __future__ import annotations
 
@@ -9,34 +9,36 @@ from torch import Tensor, nn
 
 from avn.core.errors import UserError
 
-# Power is never logged below this; it lies under the microphone's noise floor in any band.
+# Lower bound of the power before the logarithm, below the microphone's noise floor in any band.
 POWER_FLOOR = 1e-12
-# Clips whose pictures are made at once.
+# Clips that are transformed at once.
 TOGETHER = 8
 
 
 class Spectrogram(nn.Module):
-    """Log-power spectrograms of both ears, pooled over frequency bands.
+    """Log-power spectrograms of both ears, pooled into frequency bands.
 
     Parameters
     ----------
     rate : int
-        Samples a second; a clip is one second long.
+        Sampling rate in hertz; a clip is one second long.
     stft_window : float
-        Seconds of the Hann window.
-    bands, frames : int
-        Height and width of the picture. `frames` divides `rate`.
+        Length of the Hann window in seconds, at least two samples and at most 1 s.
+    bands : int
+        Number of frequency bands, 1 to half of the window's samples.
+    frames : int
+        Number of time frames, a divisor of `rate`.
     scale : {"mel", "linear"}
-        How the bands are spread over frequency.
+        Frequency scale on which the bands are spaced evenly.
     interaural : bool
-        Adds two pictures: real and imaginary part of the interaural coherence of each band and
-        frame. Its phase is the time difference between the ears, its size falls with
-        reverberation; power alone has lost both.
+        Whether two channels are added: real and imaginary part of the interaural coherence of each
+        band and frame. Its phase holds the interaural time difference, and its magnitude falls
+        with reverberation; power spectra hold neither.
 
     Raises
     ------
     UserError
-        Where a parameter cannot work, by its name in the config node.
+        Where a parameter is out of range.
     """
 
     band_weights: Tensor
@@ -56,37 +58,37 @@ class Spectrogram(nn.Module):
         _check(rate, window, bands, frames, scale)
         self.rate, self.window, self.frames, self.bands = rate, window, frames, bands
         self.interaural = interaural
-        # Made again from the config at every start, so not part of a checkpoint.
+        # Computed from the config, so not part of a checkpoint.
         self.register_buffer("hann", torch.hann_window(window), persistent=False)
         weights = band_weights(rate, window, bands, scale)
         self.register_buffer("band_weights", weights, persistent=False)
 
     @property
     def channels(self) -> int:
-        """How many pictures a clip gives: 2, with interaural coherence 4."""
+        """Number of channels: 2, or 4 with interaural coherence."""
         return 4 if self.interaural else 2
 
     def forward(self, clips: Tensor) -> Tensor:
-        """Compute the pictures of N clips.
+        """Compute the spectrograms of N clips.
 
-        The absolute level is kept: a clip 20 dB louder gives pictures higher by 2.
+        The absolute level is kept: a clip that is 20 dB louder has values higher by 2.
 
         Parameters
         ----------
         clips : (N, 2, rate) float32 tensor
-            Left and right ear. A clip is periodic: its end meets its start.
+            Left and right ear. A clip is periodic: its end joins its start.
 
         Returns
         -------
         (N, channels, bands, frames) float32 tensor
-            Left and right power in units of 10 dB, shifted by 4 so that usual clips lie round 0;
-            then, where asked for, the coherence in -1..1.
+            Left and right power in units of 10 dB, shifted by 4 to be near 0 for typical clips;
+            with `interaural`, then the coherence, -1 to 1.
         """
-        # Few at a time, so that what lies between stays in a CPU's caches: twice as fast.
+        # In small batches, so that intermediate results stay in a CPU's caches: twice as fast.
         return torch.cat([self._pictures(part) for part in clips.split(TOGETHER)])
 
     def _pictures(self, clips: Tensor) -> Tensor:
-        """(N, 2, rate) to (N, channels, bands, frames)."""
+        """Map clips (N, 2, rate) to spectrograms (N, channels, bands, frames)."""
         spectra = self._stft(clips)
         real, imaginary = spectra.real.contiguous(), spectra.imag.contiguous()
         values = real.new_empty(len(clips), self.channels, *real.shape[2:])
@@ -103,7 +105,7 @@ class Spectrogram(nn.Module):
         return pooled
 
     def _stft(self, clips: Tensor) -> Tensor:
-        """(N, 2, rate) to (N, 2, frames, window / 2 + 1) complex, of mean square per bin."""
+        """Map clips (N, 2, rate) to complex spectra (N, 2, frames, stft_window / 2 + 1)."""
         hop = self.rate // self.frames
         # The clip is circular, so its start follows its end and no edge needs padding.
         around = torch.cat((clips, clips[..., : self.window]), -1)
@@ -113,16 +115,17 @@ class Spectrogram(nn.Module):
         return torch.fft.rfft(windows * (self.hann * scale))
 
     def mirror(self, pictures: Tensor) -> Tensor:
-        """The pictures of the same clips with the ears exchanged.
+        """Return the spectrograms of the same clips with the ears exchanged.
 
         Parameters
         ----------
         pictures : (N, channels, bands, frames) tensor
+            Spectrograms as `forward` gives them.
 
         Returns
         -------
         (N, channels, bands, frames) tensor
-            Left and right exchanged; the phase between them changes its sign.
+            Left and right exchanged; the interaural phase changes its sign.
         """
         left, right, *coherence = pictures.unbind(1)
         if coherence:
@@ -131,14 +134,26 @@ class Spectrogram(nn.Module):
 
 
 def band_weights(rate: int, window: int, bands: int, scale: str) -> Tensor:
-    """Overlapping triangles that pool the bins of a spectrum into bands.
+    """Compute the triangular filter bank that pools STFT bins into bands.
 
     The mel scale is that of O'Shaughnessy, 2595 log10(1 + f / 700). A triangle narrower than
     the spacing of bins is widened to it, so that no band is empty.
 
+    Parameters
+    ----------
+    rate : int
+        Sampling rate in hertz.
+    stft_window : int
+        Length of the window in samples.
+    bands : int
+        Number of bands.
+    scale : {"mel", "linear"}
+        Frequency scale on which the bands are spaced evenly.
+
     Returns
     -------
-    (window / 2 + 1, bands) float32 tensor
+    (stft_window / 2 + 1, bands) float32 tensor
+        Weights of each bin in each band.
     """
     bins = torch.linspace(0.0, rate / 2, window // 2 + 1, dtype=torch.float64)
     top = rate / 2

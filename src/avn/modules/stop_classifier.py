@@ -1,4 +1,4 @@
-"""The stop classifier: whether the source of a sound is within reach."""
+"""Stop classifier: probability that the agent is at the goal, from one clip."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from torchmetrics import MeanMetric
 
 from avn.core.errors import UserError
 from avn.modules.audio_network import FIVE_LAYERS, AudioNetwork, PictureBatch
-from avn.modules.network import SPLITS, Part
+from avn.modules.network import SUBSETS, Part
 from avn.modules.stop_metrics import CRITERIA, StopScores
 
 ONE_SCORE: Part = {**FIVE_LAYERS, "output_scale": 1.0}
 
 
 class StopClassifier(AudioNetwork):
-    """Spectrogram, network with one output and the recipe that trains them.
+    """Binary classifier of clips: at the goal or not.
 
-    The goal is a few cells of many, so clips at the goal are shown more often in training than
-    they are met, and the log-odds are put right by the difference of the two priors (King and
-    Zeng, "Logistic regression in rare events data", Political Analysis 9, 2001): probabilities
-    are those of a state drawn from all states of the training apartments alike.
+    The goal has few of all cells, so clips at the goal are oversampled in training. The log-odds
+    are shifted by the difference of the two priors (King and Zeng, "Logistic regression in rare
+    events data", Political Analysis 9, 2001): probabilities are those of a state that is drawn
+    uniformly from all states of the training apartments.
 
     Parameters
     ----------
     net : dict
-        Config of the network, with `_target_`.
+        Config of the network on the spectrogram, with `_target_`.
     epochs : int
-        Length of the training.
+        Maximum number of epochs, 1 or more.
     positives : float
-        Share of training clips at the goal.
-    criterion : str
-        How the threshold is chosen on the validation apartments; no part of the recipe, for the
-        network is the same.
+        Share of training clips at the goal, more than 0 and less than 1.
+    criterion : {"approach", "balanced"}
+        Criterion that selects the threshold on the validation apartments; see
+        `avn.modules.stop_metrics.best_threshold`. The network does not depend on it.
     threshold : float or None
-        The threshold itself; null chooses it by the criterion.
+        Probability at and above which the agent stops, 0 to 1; null selects it by `criterion`.
     **recipe
         Those of `avn.modules.audio_network.AudioNetwork`.
     """
@@ -47,7 +47,7 @@ class StopClassifier(AudioNetwork):
     node = "stop_model"
     what = "stop classifier"
     monitor = "loss/validation"
-    # The goal is as near when the ears are exchanged.
+    # The distance to the goal is the same with the ears exchanged.
     mirror_signs = (1.0,)
 
     def __init__(
@@ -65,41 +65,41 @@ class StopClassifier(AudioNetwork):
         check_decision(criterion, threshold)
         self.register_buffer("log_odds_shift", torch.zeros(()))
         self.training_loss = MeanMetric()
-        # Plain lists: they take what is already on the CPU and are no part of a checkpoint.
-        self.losses = [MeanMetric() for _ in SPLITS]
+        # In plain lists metrics stay on the CPU and out of checkpoints.
+        self.losses = [MeanMetric() for _ in SUBSETS]
         self.scores: list[StopScores] = []
 
     def forward(self, clips: Tensor) -> Tensor:
-        """How likely the source is within reach.
+        """Estimate the probability of being at the goal for N clips.
 
         Parameters
         ----------
         clips : (N, 2, rate) float32 tensor
+            Waveforms of the left and the right ear.
 
         Returns
         -------
         (N,) float32 tensor
-            Probability.
+            Probabilities.
         """
         return torch.sigmoid(self.log_odds(self.spectrogram(clips)))
 
     def log_odds(self, pictures: Tensor) -> Tensor:
-        """(N, channels, bands, frames) pictures to (N,), put right for the prior."""
+        """Map spectrograms (N, channels, bands, frames) to prior-corrected log-odds (N,)."""
         return self.estimate(pictures)[:, 0] + self.log_odds_shift
 
     def prepare(self, data: Any) -> None:
-        """Take the sounds' names, and how seldom a state is at the goal."""
+        """Set the names of the sounds and the prior correction from the data module."""
         super().prepare(data)
-        shown = self.hparams["positives"]
-        shift = _log_odds(data.prior) - _log_odds(shown)
+        shift = _log_odds(data.prior) - _log_odds(self.hparams["positives"])
         self.log_odds_shift.fill_(shift)
 
     def name_sounds(self, sounds: Sequence[str]) -> None:
-        """Say what the sounds of the batches are called; the metrics are by these names."""
-        self.scores = [StopScores(sounds) for _ in SPLITS]
+        """Set the names of the sounds, by index; metrics are grouped by them."""
+        self.scores = [StopScores(sounds) for _ in SUBSETS]
 
     def training_step(self, batch: PictureBatch, index: int) -> Tensor:
-        """The cross-entropy, with half of the clips mirrored."""
+        """Return the cross-entropy, after flip augmentation."""
         at_goal = (batch["target"] == 0).float()[:, None]
         pictures, at_goal = self.random_flip(batch["pictures"], at_goal)
         loss = nn.functional.binary_cross_entropy_with_logits(self._net(pictures), at_goal)
@@ -107,12 +107,22 @@ class StopClassifier(AudioNetwork):
         return loss
 
     def on_train_epoch_end(self) -> None:
-        """Log the loss that the epoch's steps saw (with dropout, the goal shown often)."""
+        """Log the mean training loss of the epoch (with dropout and oversampled goals)."""
         self.log("loss/steps", self.training_loss.compute() * 1.0)
         self.training_loss.reset()
 
     def validation_step(self, batch: PictureBatch, index: int, dataloader_idx: int = 0) -> None:
-        """Take in the scores of one batch of one of `SPLITS`."""
+        """Add one batch to the metrics of a subset.
+
+        Parameters
+        ----------
+        batch : PictureBatch
+            Spectrograms with moves to the goal.
+        index : int
+            Number of the batch; unused.
+        dataloader_idx : int
+            Index into `SUBSETS`.
+        """
         log_odds, moves = self.log_odds(batch["pictures"]).cpu(), batch["target"].cpu()
         at_goal = (moves == 0).float()
         loss = nn.functional.binary_cross_entropy_with_logits(log_odds, at_goal)
@@ -121,19 +131,19 @@ class StopClassifier(AudioNetwork):
         self.scores[dataloader_idx].update(torch.sigmoid(log_odds), moves, in_sight, sound)
 
     def on_validation_epoch_end(self) -> None:
-        """Log losses and figures such as `auc/validation/in_sight/ring`."""
-        for split, loss, scores in zip(SPLITS, self.losses, self.scores, strict=True):
-            values = {f"loss/{split}": loss.compute()}
+        """Log losses and metrics such as `auc/validation/in_sight/ring`."""
+        for subset, loss, scores in zip(SUBSETS, self.losses, self.scores, strict=True):
+            values = {f"loss/{subset}": loss.compute()}
             for name, value in scores.compute().items():
                 kind, group = name.split("/", 1)
-                values[f"{kind}/{split}/{group}"] = value
+                values[f"{kind}/{subset}/{group}"] = value
             loss.reset()
             scores.reset()
             self.keep(values)
 
 
 def check_decision(criterion: str, threshold: float | None) -> None:
-    """Raise `UserError` where the node's `criterion` or `threshold` cannot work."""
+    """Raise `UserError` for an unknown `criterion` or a `threshold` outside 0 to 1."""
     if criterion not in CRITERIA:
         known = ", ".join(CRITERIA)
         raise UserError(f"stop_model.criterion: '{criterion}' is none of {known}")

@@ -1,4 +1,4 @@
-"""How well what is heard tells that the goal is reached, and where to draw the line."""
+"""Metrics of stop classifiers, and selection of the stop threshold."""
 
 from __future__ import annotations
 
@@ -13,27 +13,29 @@ from torchmetrics.utilities.data import dim_zero_cat
 from avn.core.errors import UserError
 from avn.modules.sound_metrics import ALL, SIGHTS
 
-# Times that an agent listens at the goal before it has walked off again.
+# Clips that an agent hears at the goal before it leaves again.
 TRIES = 2
 
 
 def error_rates(probability: Tensor, moves: Tensor, threshold: float) -> dict[str, float]:
-    """What a threshold gets wrong.
+    """Compute the error rates of a stop threshold.
 
     Parameters
     ----------
     probability : (N,) float tensor
-        That the goal is reached; at `threshold` and over it, the agent stops.
+        Estimated probability of being at the goal.
     moves : (N,) tensor
         Moves to the goal, 0 at the goal.
+    threshold : float
+        Probability at and above which the agent stops.
 
     Returns
     -------
-    dict
-        `miss`: share of clips at the goal where it does not stop. `false_alarm`: share of the
-        others where it does. `false_stops`: false alarms to be expected of an agent that listens
-        once at each number of moves from the goal, from the farthest that occurs to 1. One that
-        has no clips to be measured on is left out.
+    dict of str to float
+        `miss`: share of clips at the goal where the agent does not stop. `false_alarm`: share of
+        the other clips where it stops. `false_stops`: expected number of false alarms of an agent
+        that hears one clip at each number of moves, from the largest that occurs down to 1. A rate
+        without clips is left out.
     """
     stops, at_goal = probability >= threshold, moves == 0
     rates: dict[str, float] = {}
@@ -46,25 +48,25 @@ def error_rates(probability: Tensor, moves: Tensor, threshold: float) -> dict[st
 
 
 def approach_weights(moves: Tensor) -> Tensor:
-    """Weights (N,) whose sum is 1 over the clips of each number of moves, and 0 at the goal."""
-    _, which, counts = moves.unique(return_inverse=True, return_counts=True)
-    return torch.where(moves == 0, 0.0, 1.0 / counts[which].double())
+    """Return weights (N,) that sum to 1 over the clips of each number of moves; 0 at the goal."""
+    _, group, counts = moves.unique(return_inverse=True, return_counts=True)
+    return torch.where(moves == 0, 0.0, 1.0 / counts[group].double())
 
 
 def _approach(miss: Tensor, _: Tensor, false_stops: Tensor) -> Tensor:
-    """Chance to arrive without a false stop and to stop there within `TRIES` clips.
+    """Return the probability of no false stop on the way and a stop within `TRIES` clips there.
 
-    False stops are rare and taken as independent, so that none happens with exp(-their mean).
+    False stops are rare and assumed independent: none happens with probability exp(-mean number).
     """
     return torch.exp(-false_stops) * (1 - miss**TRIES)
 
 
 def _balanced(miss: Tensor, false_alarm: Tensor, _: Tensor) -> Tensor:
-    """Youden's J, "Index for rating diagnostic tests" (Cancer 3, 1950), both errors alike."""
+    """Return Youden's J ("Index for rating diagnostic tests", Cancer 3, 1950)."""
     return 1 - miss - false_alarm
 
 
-# What is to be as great as it can, of the three error rates.
+# Objectives to maximise, from the rates `miss`, `false_alarm` and `false_stops`.
 CRITERIA: dict[str, Callable[[Tensor, Tensor, Tensor], Tensor]] = {
     "approach": _approach,
     "balanced": _balanced,
@@ -72,22 +74,23 @@ CRITERIA: dict[str, Callable[[Tensor, Tensor, Tensor], Tensor]] = {
 
 
 def best_threshold(probability: Tensor, moves: Tensor, criterion: str) -> float:
-    """The threshold that serves a criterion best on some clips.
+    """Select the threshold that maximises a criterion on some clips.
 
     Parameters
     ----------
     probability : (N,) float tensor
+        Estimated probability of being at the goal.
     moves : (N,) tensor
         Moves to the goal, 0 at the goal.
     criterion : {"approach", "balanced"}
-        "approach": a false stop ends the episode, and every step of the way gives occasion to
-        one, while a miss can be made good at the next step; the chance to end well is greatest.
-        "balanced": the sum of miss and false alarm is least.
+        "approach": maximum probability of a success, where a false stop at any step ends the
+        episode and a miss can be corrected at the next step. "balanced": minimum sum of `miss`
+        and `false_alarm`.
 
     Returns
     -------
     float
-        Half-way between two scores, so that none lies on it.
+        Threshold, half-way between two scores.
 
     Raises
     ------
@@ -102,12 +105,12 @@ def best_threshold(probability: Tensor, moves: Tensor, criterion: str) -> float:
         raise UserError("split.validation: all its clips are at the goal, or none is")
     scores, order = probability.double().sort(descending=True)
     at_goal, weights = at_goal[order].double(), approach_weights(moves)[order]
-    # After the k highest scores, k = 0..N.
+    # Rates of stopping at the k highest scores, k = 0..N.
     miss = 1 - _running(at_goal) / at_goal.sum()
     false_alarm = _running(1 - at_goal) / (1 - at_goal).sum()
     merit = CRITERIA[criterion](miss, false_alarm, _running(weights))
     ends = torch.cat((scores.new_ones(1), scores, scores.new_zeros(1)))
-    # Equal scores cannot be parted.
+    # No threshold lies between equal scores.
     merit[1:-1][scores[1:] == scores[:-1]] = -torch.inf
     cut = int(merit.argmax())
     return float((ends[cut] + ends[cut + 1]) / 2)
@@ -118,12 +121,12 @@ def _running(values: Tensor) -> Tensor:
 
 
 class StopScores(Metric):
-    """Area under the ROC curve and calibration, in and out of sight, by sound.
+    """ROC AUC and calibration error of stop probabilities, by sight and sound.
 
     Parameters
     ----------
     sounds : sequence of str
-        Names of the sounds; `update` takes indices into it.
+        Names of the sounds, by index.
     """
 
     full_state_update = False
@@ -135,14 +138,18 @@ class StopScores(Metric):
             self.add_state(state, default=[], dist_reduce_fx="cat")
 
     def update(self, probability: Tensor, moves: Tensor, in_sight: Tensor, sound: Tensor) -> None:
-        """Take in N scores.
+        """Add N estimates.
 
         Parameters
         ----------
         probability : (N,) float tensor
-        moves : (N,) tensor, moves to the goal
-        in_sight : (N,) bool tensor, whether the source is
-        sound : (N,) int64 tensor, index into the names
+            Estimated probability of being at the goal.
+        moves : (N,) tensor
+            Moves to the goal, 0 at the goal.
+        in_sight : (N,) bool tensor
+            Whether the source is in the line of sight.
+        sound : (N,) int64 tensor
+            Index of the sound.
         """
         self.probability.append(probability)  # type: ignore[union-attr, operator]
         self.moves.append(moves)  # type: ignore[union-attr, operator]
@@ -150,11 +157,11 @@ class StopScores(Metric):
         self.sound.append(sound)  # type: ignore[union-attr, operator]
 
     def scores(self) -> tuple[Tensor, Tensor]:
-        """Probabilities and moves of all that was taken in, (N,) each."""
+        """Return all probabilities and moves that were added, (N,) each."""
         return dim_zero_cat(self.probability), dim_zero_cat(self.moves)  # type: ignore[arg-type]
 
     def groups(self) -> dict[str, Tensor]:
-        """Which clips, (N,) bool, each group has, such as `in_sight/ring` or `all/all`."""
+        """Return the mask (N,) of each group's clips, such as `in_sight/ring` or `all/all`."""
         in_sight = dim_zero_cat(self.in_sight)  # type: ignore[arg-type]
         sound = dim_zero_cat(self.sound)  # type: ignore[arg-type]
         sights = {ALL: torch.ones_like(in_sight), SIGHTS[0]: in_sight, SIGHTS[1]: ~in_sight}
@@ -165,23 +172,23 @@ class StopScores(Metric):
         }
 
     def compute(self) -> dict[str, Tensor]:
-        """Figures by name, such as `auc/in_sight/ring`, and `ece/all/all`.
+        """Return metrics by name: `auc/in_sight/ring` and the like, and `ece/all/all`.
 
-        `auc` of a group that lacks either kind of clip is left out.
+        The AUC of a group with one class of clips only is left out.
         """
         probability, moves = self.scores()
         label = (moves == 0).int()
-        figures = {"ece/all/all": binary_calibration_error(probability, label, n_bins=15)}
-        for name, chosen in self.groups().items():
-            if 0 < int(label[chosen].sum()) < int(chosen.sum()):
-                figures[f"auc/{name}"] = binary_auroc(probability[chosen], label[chosen])
-        return figures
+        metrics = {"ece/all/all": binary_calibration_error(probability, label, n_bins=15)}
+        for name, group in self.groups().items():
+            if 0 < int(label[group].sum()) < int(group.sum()):
+                metrics[f"auc/{name}"] = binary_auroc(probability[group], label[group])
+        return metrics
 
     def at(self, threshold: float) -> dict[str, float]:
-        """`error_rates` at a threshold by name, such as `miss/in_sight/ring`."""
+        """Return `error_rates` at a threshold by name, such as `miss/in_sight/ring`."""
         probability, moves = self.scores()
         return {
             f"{rate}/{name}": value
-            for name, chosen in self.groups().items()
-            for rate, value in error_rates(probability[chosen], moves[chosen], threshold).items()
+            for name, group in self.groups().items()
+            for rate, value in error_rates(probability[group], moves[group], threshold).items()
         }

@@ -1,4 +1,4 @@
-"""Fits a network in a folder: checkpoints, TensorBoard, resuming."""
+"""Training of networks with Lightning: checkpoints, TensorBoard, resuming."""
 
 from __future__ import annotations
 
@@ -30,28 +30,30 @@ def fit(
     callbacks: Sequence[Callback] = (),
     accelerator: str = "auto",
 ) -> dict[str, Any]:
-    """Train a network in a folder, or go on where a stopped training was.
+    """Train a network in a folder, or resume an interrupted training.
 
-    Writes TensorBoard's events, `best.ckpt` (the epoch that the model's `monitor` says) and
-    `last.ckpt` into the folder. Sets the model's weights to the best ones. With the same
-    recipe and the same machine the weights are the same, whether it was interrupted or not.
+    Writes TensorBoard events, `best.ckpt` (the best epoch by the model's `monitor`) and `last.ckpt`
+    into the folder. Sets the model's weights to the best ones. The same recipe on the same machine
+    gives the same weights, also after an interruption.
 
     Parameters
     ----------
     data : LightningDataModule
-        With `threads`, how many threads make its batches, and loaders with samplers.
+        Data module with an attribute `threads`, the number of threads that make batches, and
+        loaders with samplers.
     model : Network
-        Built from the same recipe as `data`.
+        Network that is built from the same recipe as `data`.
     folder : Path
+        Folder of the checkpoints and events; created if missing.
     callbacks : sequence of Callback
-        Further ones, such as those that show figures in TensorBoard.
+        Further callbacks, such as those that log figures to TensorBoard.
     accelerator : str
-        Lightning's name of the device to compute on.
+        Lightning's name of the device.
 
     Returns
     -------
     dict
-        `epochs` trained, the best `epoch`, and what the model measured there.
+        Number of `epochs` trained, best `epoch`, and the metrics of that epoch.
 
     Raises
     ------
@@ -64,8 +66,8 @@ def fit(
         _read_checkpoint(last, model)
     model.prepare(data)
     history = _History()
-    # Patience and the best checkpoint come before the last one, which so holds their state.
-    every = [
+    # Early stopping and the best checkpoint come before the last one, which so holds their state.
+    all_callbacks = [
         EarlyStopping(
             model.monitor,
             mode=model.mode,
@@ -89,7 +91,7 @@ def fit(
             devices=1,
             max_epochs=model.hparams["epochs"],
             logger=TensorBoardLogger(folder, name="", version="", default_hp_metric=False),
-            callbacks=every,
+            callbacks=all_callbacks,
             num_sanity_val_steps=0,
             enable_progress_bar=False,
             enable_model_summary=False,
@@ -108,7 +110,7 @@ def fit(
 def _every_epoch(
     folder: Path, name: str, monitor: str | None, mode: str = "min"
 ) -> ModelCheckpoint:
-    """Keep one checkpoint: of the epoch where `monitor` is best, or of the latest."""
+    """Return a callback that keeps one checkpoint: the best by `monitor`, or the latest."""
     return ModelCheckpoint(
         dirpath=folder,
         filename=Path(name).stem,
@@ -120,7 +122,7 @@ def _every_epoch(
 
 
 def load_weights(model: Trained, path: Path) -> Trained:
-    """Give a network the weights of a checkpoint of the same recipe, and stop its training.
+    """Load the weights of a checkpoint of the same recipe and set the network to evaluation.
 
     Raises
     ------
@@ -132,7 +134,7 @@ def load_weights(model: Trained, path: Path) -> Trained:
 
 
 def _read_checkpoint(path: Path, model: Network) -> dict[str, Any]:
-    """Read a checkpoint and compare its recipe with the model's."""
+    """Read a checkpoint and refuse one of another recipe than the model's."""
     try:
         checkpoint = torch.load(path, map_location="cpu", weights_only=True)
         recipe, _ = dict(checkpoint["hyper_parameters"]), checkpoint["state_dict"]
@@ -146,10 +148,10 @@ def _read_checkpoint(path: Path, model: Network) -> dict[str, Any]:
         ) from error
     wanted = dict(model.hparams)
     for key, value in _flat(wanted).items():
-        found = _flat(recipe).get(key, "missing")
-        if found != value:
+        saved = _flat(recipe).get(key, "missing")
+        if saved != value:
             raise UserError(
-                f"{path}: checkpoint of another config ({model.node}.{key} is {found} there, "
+                f"{path}: checkpoint of another config ({model.node}.{key} is {saved} there, "
                 f"{value} here); give the same value or train again"
             )
     return checkpoint
@@ -164,7 +166,7 @@ def _flat(config: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 class _History(Callback):
-    """Remembers what was measured after each epoch, over interruptions too."""
+    """Metrics after each epoch, kept in checkpoints."""
 
     def __init__(self) -> None:
         self.epochs: list[dict[str, float]] = []
@@ -181,7 +183,7 @@ class _History(Callback):
 
 
 class _Progress(Callback):
-    """One bar for the whole training: inputs seen, inputs a second, time left."""
+    """Progress bar over the whole training, counted in inputs."""
 
     def on_train_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
         data = trainer.datamodule  # type: ignore[attr-defined]
@@ -211,13 +213,14 @@ class _Progress(Callback):
     def on_exception(
         self, trainer: L.Trainer, pl_module: L.LightningModule, exception: BaseException
     ) -> None:
+        """See `Callback.on_exception`."""
         if hasattr(self, "_stack"):
             self._stack.close()
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Lightning from advertising devices and worker counts that do not apply here."""
+    """Suppress Lightning's messages about devices and numbers of workers."""
     logger = logging.getLogger("lightning.pytorch")
     level = logger.level
     logger.setLevel(logging.ERROR)

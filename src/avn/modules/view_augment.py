@@ -1,4 +1,4 @@
-"""Pictures as another camera, another light and another decorator might have made them."""
+"""Image augmentation of views: colour, light, noise, blur, erasing, shifts."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from torch import Tensor, nn
 
 @dataclass
 class AugmentConfig:
-    """How strongly views are changed in training; 0 leaves a thing as it is.
+    """Strength of each image augmentation of training views; 0 turns one off.
 
     Attributes
     ----------
     colour : float
-        Turn of the hue, change of saturation and gain of each channel; 1 allows any hue.
+        Range of hue rotation, saturation and channel gain, 0 to 1; 1 allows any hue.
     light : float
-        Brightness, contrast and gamma, as powers of 2.
+        Range of brightness, contrast and gamma, in factors of up to 2^0.7 at 1.
     noise : float
-        Greatest standard deviation of noise, of a range of 1.
+        Maximum standard deviation of Gaussian noise, where pixel values are 0 to 1.
     blur : float
-        Share of pictures that are blurred.
+        Probability that a picture is blurred.
     erase : int
-        Most rectangles that are painted over.
+        Number of random rectangles that are painted over.
     shift : int
-        Most pixels by which a picture is moved.
+        Maximum translation in pixels.
     """
 
     colour: float = 1.0
@@ -38,20 +38,21 @@ class AugmentConfig:
 
 
 def augment(pictures: Tensor, config: AugmentConfig, generator: torch.Generator) -> Tensor:
-    """Change each picture in a way of its own.
+    """Augment each picture with its own random parameters.
 
     Parameters
     ----------
     pictures : (N, 3, H, W) float32 tensor
-        0 to 1.
+        RGB, 0 to 1.
     config : AugmentConfig
+        Strength of each augmentation.
     generator : torch.Generator
-        Draws what is done.
+        Source of randomness.
 
     Returns
     -------
     (N, 3, H, W) float32 tensor
-        0 to 1.
+        RGB, 0 to 1.
     """
     count = len(pictures)
 
@@ -86,7 +87,7 @@ def augment(pictures: Tensor, config: AugmentConfig, generator: torch.Generator)
 
 
 def _recolour(pictures: Tensor, strength: float, draw) -> Tensor:  # type: ignore[no-untyped-def]
-    """Turn colours round the axis of greys, fade or deepen them, and tint the light."""
+    """Rotate hues about the grey axis, scale the saturation and scale the channels."""
     count = len(pictures)
     angle = draw(-math.pi * strength, math.pi * strength, count)
     saturation = draw(1 - strength, 1 + 0.5 * strength, count)
@@ -101,18 +102,18 @@ def _recolour(pictures: Tensor, strength: float, draw) -> Tensor:  # type: ignor
 
 
 def _shift(pictures: Tensor, most: int, generator: torch.Generator) -> Tensor:
-    """Move each picture by whole pixels; what comes in repeats the edge."""
+    """Translate each picture by whole pixels; the border repeats the edge."""
     count, _, height, width = pictures.shape
     steps = torch.randint(-most, most + 1, (2, count), generator=generator)
     rows = (torch.arange(height) + steps[0][:, None]).clamp(0, height - 1)
     columns = (torch.arange(width) + steps[1][:, None]).clamp(0, width - 1)
-    which = torch.arange(count)[:, None, None]
-    moved = pictures.permute(0, 2, 3, 1)[which, rows[:, :, None], columns[:, None, :]]
+    index = torch.arange(count)[:, None, None]
+    moved = pictures.permute(0, 2, 3, 1)[index, rows[:, :, None], columns[:, None, :]]
     return moved.permute(0, 3, 1, 2)
 
 
 def _erase(pictures: Tensor, most: int, draw) -> Tensor:  # type: ignore[no-untyped-def]
-    """Paint over small rectangles."""
+    """Paint small rectangles of random colour over each picture."""
     count, _, height, width = pictures.shape
     row, column = torch.arange(height)[:, None], torch.arange(width)
     for _ in range(most):

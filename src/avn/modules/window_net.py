@@ -1,4 +1,4 @@
-"""From a picture to the cells ahead: features are looked up where each cell is in the picture."""
+"""Occupancy network that samples image features at the projections of the cells ahead."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from avn.apartments.local_patch import WINDOW, window_offsets
 from avn.core.errors import UserError
 from avn.views.camera import CameraConfig
 
-# Where in a cell features are looked up, in metres: right and front of its centre, over the floor.
+# Sampling points of a cell, in metres: right and front of its centre, height over the floor.
 PROBES = (
     (0.0, 0.0, 0.0),
     (-0.18, -0.18, 0.0),
@@ -29,18 +29,19 @@ OUTPUTS = 2
 
 
 def probe_places(camera: CameraConfig) -> tuple[Tensor, Tensor]:
-    """Where the probes of each cell of the window lie in the picture.
+    """Project the sampling points of each cell of the local patch into the image.
 
     Parameters
     ----------
     camera : CameraConfig
+        Height in metres, pitch and field of view in degrees.
 
     Returns
     -------
     places : (25, P, 2) float32 tensor
-        Right and down from the middle of the picture, -1 and 1 at its edges; held to -1..1.
+        Image coordinates right and down from the centre, -1 and 1 at the edges; clipped to -1..1.
     inverse_depth : (25, P) float32 tensor
-        1 / metres along the camera's axis.
+        1 / metres along the optical axis.
     """
     cells = window_offsets().reshape(-1, 1, 2) * CELL
     probes = np.array(PROBES)
@@ -67,25 +68,31 @@ def _doubled(features: Tensor) -> Tensor:
 
 
 class WindowNet(nn.Module):
-    """A U-shaped network, whose features are looked up where the window's cells are.
+    """U-shaped CNN that samples features at the projections of the local patch's cells.
 
-    The camera stands and looks the same way always, so each cell of the window has its place in
-    the picture. Looking features up there, and the same layers for all cells, leave the network
-    little else to go by than what is seen of a cell, which carries over to other apartments
-    (the idea of spatial transformers, Jaderberg et al., NeurIPS 2015, with fixed places).
-    The network also estimates depth, and compares it with that of the cell.
+    The pose of the camera relative to the agent is fixed, so each cell projects to a fixed place in
+    the image. Features are sampled there (as in spatial transformers, Jaderberg et al., NeurIPS
+    2015, with fixed sampling points), and all cells share the layers behind. The estimate of a
+    cell so depends mostly on its own pixels, which generalises to other apartments. The network
+    also estimates inverse depth and compares it with that of each cell.
 
     Parameters
     ----------
     camera : CameraConfig
+        Camera of the views.
     widths : sequence of 4 int
-        Channels at a half, a quarter, an eighth and a sixteenth of the picture's size.
+        Channels at 1/2, 1/4, 1/8 and 1/16 of the image's resolution, 1 or more each.
     decoder : int
-        Channels at a quarter of the size, from which features are looked up.
+        Channels of the feature map at 1/4 resolution that is sampled, 1 or more.
     cell : int
-        Channels of each cell.
+        Channels of each cell, 1 or more.
     dropout : float
-        Share of a cell's channels that training silences.
+        Dropout probability of a cell's channels, 0 or more and less than 1.
+
+    Raises
+    ------
+    UserError
+        Where a parameter is out of range.
     """
 
     places: Tensor
@@ -126,41 +133,42 @@ class WindowNet(nn.Module):
         )
         self.place = nn.Parameter(torch.zeros(WINDOW * WINDOW, cell))
         self.scene = nn.Linear(sixteenth, cell)
-        # Cells tell their neighbours what they see: walls go on, and near things hide far ones.
+        # Convolutions over the patch: walls continue, and near objects hide far cells.
         self.neighbours = nn.Sequential(_layer(cell, cell), _layer(cell, cell))
         self.answer = nn.Conv2d(2 * cell, OUTPUTS, 1)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Judge N pictures.
+        """Estimate log-odds of the cells and inverse depth in N pictures.
 
         Parameters
         ----------
         pictures : (N, 3, size, size) float32 tensor
+            Normalised RGB.
 
         Returns
         -------
         log_odds : (N, 2, 5, 5) float32 tensor
-            That each cell is free, and that it is visible.
+            Log-odds that each cell is free, and that it is visible.
         inverse_depth : (N, 1, size / 4, size / 4) float32 tensor
-            1 / metres along the camera's axis.
+            1 / metres along the optical axis.
         """
         quarter = self.to_quarter(self.to_half(pictures))
         eighth = self.to_eighth(quarter)
         deep = self.to_sixteenth(eighth)
-        # From coarse to fine, as in feature pyramids (Lin et al., CVPR 2017).
+        # Top-down pathway as in feature pyramid networks (Lin et al., CVPR 2017).
         up = _doubled(self.from_sixteenth(deep)) + self.from_eighth(eighth)
         up = _doubled(self.join_eighth(up)) + self.from_quarter(quarter)
         features = self.join_quarter(up)
         inverse_depth = nn.functional.softplus(self.depth(features))
-        return self._window(features, inverse_depth, deep.mean((2, 3))), inverse_depth
+        return self._local_patch(features, inverse_depth, deep.mean((2, 3))), inverse_depth
 
-    def _window(self, features: Tensor, inverse_depth: Tensor, scene: Tensor) -> Tensor:
+    def _local_patch(self, features: Tensor, inverse_depth: Tensor, scene: Tensor) -> Tensor:
         seen = torch.cat((features, inverse_depth), 1)
         places = self.places.expand(len(seen), -1, -1, -1)
         looked = nn.functional.grid_sample(
             seen, places, mode="bilinear", padding_mode="border", align_corners=False
         )
-        # (N, channels, 25, P) to the cell's own list, depth as what lies between.
+        # (N, channels, 25, P); the last channel becomes estimated less projected inverse depth.
         looked = torch.cat((looked[:, :-1], looked[:, -1:] - self.inverse_depth), 1)
         cells = self.look(looked.permute(0, 2, 3, 1).flatten(2))
         cells = cells + self.place + self.scene(scene)[:, None]

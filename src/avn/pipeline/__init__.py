@@ -1,0 +1,1 @@
+"""Stages of the pipeline: data, trained networks, runs, tables and reports."""

@@ -1,4 +1,4 @@
-"""The agent of a config: a planner with its mapper, or a baseline."""
+"""Construction of the agent of a config: a planner with a mapper, or a baseline."""
 
 from __future__ import annotations
 
@@ -13,25 +13,27 @@ from avn.core.errors import UserError
 from avn.mapping.base import Mapper
 from avn.modules.stop_classifier import check_decision
 from avn.navigation.protocols import Protocol
-from avn.pipeline import policy, stop_classifier
+from avn.pipeline import policy, policy_data, stop_classifier
 from avn.pipeline.stage import Stage
 
-# Settings of the nodes `mapper` and `planner` that are no arguments of their classes.
+# Settings of the node `mapper` that are no arguments of its class.
 _OTHERS = ("name", "visible_above")
 
 
 def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
-    """The agent that the groups `planner`, `mapper` and `baseline` describe.
+    """Build the agent that the groups `planner`, `mapper` and `baseline` describe.
 
     Parameters
     ----------
+    cfg : DictConfig
+        Config of a command.
     ready : bool
-        Whether it shall act: then its network is read, and from when on to say Stop.
+        Whether the agent will act: then its trained network and its stop threshold are read.
 
     Raises
     ------
     UserError
-        Where nothing acts, two things do, or a setting cannot work.
+        Where there is no agent, there are two, or a setting cannot work.
     """
     if cfg.planner._target_ and cfg.baseline._target_:
         raise UserError(
@@ -40,7 +42,7 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
         )
     if cfg.baseline._target_:
         check_no_truth(cfg)
-        learnt = policy.parts(cfg) if policy.learns(cfg) else {}
+        learnt = policy_data.parts(cfg) if policy.learns(cfg) else {}
         if learnt and ready:
             learnt["network"] = policy.Policy(cfg).load()
         return build_object("baseline", cfg.baseline, **learnt)
@@ -60,14 +62,14 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
 
 
 def decides(cfg: DictConfig) -> bool:
-    """Whether the agent says Stop by the probability of the stop classifier."""
+    """Return whether the agent stops by the probability of the stop classifier."""
     return bool(
-        cfg.planner._target_ and cfg.protocol.requires_stop and stop_classifier.can_stop(cfg)
+        cfg.planner._target_ and cfg.protocol.requires_stop and stop_classifier.has_stop_model(cfg)
     )
 
 
 def agent_stages(cfg: DictConfig) -> list[Stage]:
-    """The networks that the agent acts with, beside those that make what it observes."""
+    """Return the stages of the agent's own networks, without those of its observations."""
     if policy.learns(cfg):
         return [policy.Policy(cfg)]
     if decides(cfg) and cfg.stop_model.threshold is None:
@@ -76,18 +78,18 @@ def agent_stages(cfg: DictConfig) -> list[Stage]:
 
 
 def agent_settings(cfg: DictConfig) -> list[str]:
-    """Keys of the config by which it acts."""
+    """Return the keys of the config that change the agent's actions."""
     if not cfg.planner._target_:
         return ["baseline"]
     decision: list[str] = []
     if decides(cfg):
-        chosen = cfg.stop_model.threshold is None
-        decision = ["stop_model.threshold", *(["stop_model.criterion"] if chosen else [])]
+        selected = cfg.stop_model.threshold is None
+        decision = ["stop_model.threshold", *(["stop_model.criterion"] if selected else [])]
     return ["planner", "mapper", *decision]
 
 
 def agent_ignored(cfg: DictConfig) -> list[str]:
-    """Keys below those of `agent_settings` that make no difference to it."""
+    """Return the keys below those of `agent_settings` that do not change its actions."""
     unread = [f"mapper.{name}" for name in _OTHERS]
     agent, node = build_agent(cfg), "planner" if cfg.planner._target_ else "baseline"
     protocol: Protocol = build_object("protocol", cfg.protocol)
@@ -97,13 +99,13 @@ def agent_ignored(cfg: DictConfig) -> list[str]:
         unread += [f"mapper.{name}" for name in mapper.unused_settings()]
     if policy.learns(cfg):
         acting = ("baseline.samples",)
-        own = [key for key in policy.Policy(cfg).ignored() if key.startswith("baseline.")]
-        unread += [key for key in own if key not in acting]
+        unused = [key for key in policy.Policy(cfg).ignored() if key.startswith("baseline.")]
+        unread += [key for key in unused if key not in acting]
     return unread
 
 
 def check_agent(cfg: DictConfig, agent: Agent) -> None:
-    """Refuse what an agent would stumble over once it acts, such as the size of its map."""
+    """Refuse settings that would fail once the agent acts, such as the size of its map."""
     if cfg.planner._target_:
         agent.reset(1, torch.Generator(), build_object("protocol", cfg.protocol))
     if decides(cfg):
@@ -111,7 +113,7 @@ def check_agent(cfg: DictConfig, agent: Agent) -> None:
 
 
 def check_no_truth(cfg: DictConfig) -> None:
-    """Refuse to give a baseline parts of the truth, which none can use."""
+    """Refuse `agent.oracle_inputs` for a baseline, which cannot use them."""
     if cfg.agent.oracle_inputs:
         raise UserError(
             "agent.oracle_inputs: only agents that plan can be given a part of the truth"

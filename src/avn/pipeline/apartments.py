@@ -1,7 +1,7 @@
-"""Apartments of the test world or of the training world, and stages with a file for each of them.
+"""Apartments of the test world and the training world, and stages with a file per apartment.
 
-The test world is where agents are evaluated, the training world where networks are trained. By
-default both have the same split and the same acoustics.
+Agents are evaluated in the test world and networks trained in the training world. By default both
+have the same split and the same acoustics.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from avn.pipeline.stage import Stage
 
 
 @dataclass(frozen=True)
-class World:
-    """The keys of the config that describe a world.
+class WorldKeys:
+    """Config keys of a world's nodes.
 
     Attributes
     ----------
     split, acoustics, microphone, sounds : str
-        Its apartments, how sound spreads in them, what records it, and which sounds there are.
+        Keys of the apartments, the acoustics, the microphone and the sounds.
     """
 
     split: str
@@ -41,28 +41,33 @@ class World:
     sounds: str
 
 
-TEST = World("split", "acoustics", "microphone", "sound")
-TRAINING = World("training.scenes", "training.acoustics", "training.microphone", "training.sounds")
+TEST = WorldKeys("split", "acoustics", "microphone", "sound")
+TRAINING = WorldKeys(
+    "training.scenes", "training.acoustics", "training.microphone", "training.sounds"
+)
 
 
 @dataclass(frozen=True)
 class Apartments:
-    """The apartments of one part of a world's split.
+    """Apartments of one subset of a world's split.
 
     Attributes
     ----------
     cfg : DictConfig
-    part : {"train", "validation", "test"}
-    world : World
+        Config of a command.
+    subset : {"train", "validation", "test"}
+        Subset of the split.
+    world : WorldKeys
+        Config keys of the world.
     """
 
     cfg: DictConfig = field(compare=False, repr=False)
-    part: str
-    world: World = TEST
+    subset: str
+    world: WorldKeys = TEST
 
     @property
     def plans(self) -> list[FloorPlan]:
-        """Their floor plans.
+        """Floor plans of the apartments.
 
         Raises
         ------
@@ -71,39 +76,39 @@ class Apartments:
         """
         split = OmegaConf.select(self.cfg, self.world.split)
         check_name(f"{self.world.split}.name", split.name)
-        plans = _plans(split)[self.part]
+        plans = _plans(split)[self.subset]
         if not plans:
             where = f" in {split.folder}" if split.folder else ""
             raise UserError(
-                f"{self.world.split}.{self.part} is empty: no floor plan of that part{where}; "
+                f"{self.world.split}.{self.subset} is empty: no floor plan of that subset{where}; "
                 "add one (train_*.json, val_*.json, any other name for test)"
             )
         return plans
 
     @property
     def cells(self) -> int:
-        """How many free cells they have together."""
+        """Total number of free cells."""
         return sum(cells_of(plan) for plan in self.plans)
 
     @property
     def pairs(self) -> int:
-        """How many pairs of source and free cell they have together."""
+        """Total number of pairs of source and free cell."""
         return sum(len(plan.sources) * cells_of(plan) for plan in self.plans)
 
     def node(self, name: str) -> Any:
-        """The node of the config that the world has under a name, such as `acoustics`."""
+        """Return the world's config node of a name, such as `acoustics`."""
         return OmegaConf.select(self.cfg, getattr(self.world, name))
 
     @property
     def title(self) -> str:
-        """What they are, for titles of stages."""
-        return f"the {self.part} apartments of '{self.node('split').name}'"
+        """Description of the apartments, for titles of stages."""
+        return f"the {self.subset} apartments of '{self.node('split').name}'"
 
 
-def apartments_of_every_part(cfg: DictConfig, world: World = TEST) -> list[Apartments]:
-    """The parts of a world's split that have apartments."""
+def apartments_of_all_subsets(cfg: DictConfig, world: WorldKeys = TEST) -> list[Apartments]:
+    """Return the non-empty subsets of a world's split."""
     split = _plans(OmegaConf.select(cfg, world.split))
-    return [Apartments(cfg, part, world) for part in PARTS if split[part]]
+    return [Apartments(cfg, subset, world) for subset in PARTS if split[subset]]
 
 
 _READ: dict[str, dict[str, list[FloorPlan]]] = {}
@@ -120,14 +125,14 @@ def _plans(split: DictConfig) -> dict[str, list[FloorPlan]]:
 
 
 def plan_hash(plan: FloorPlan) -> str:
-    """SHA-256, in hex, of a floor plan."""
+    """Return the SHA-256 of a floor plan, in hex."""
     if id(plan) not in _HASHES:
         _HASHES[id(plan)] = (plan, digest(plan.to_dict()))  # the plan, so that its id stays its own
     return _HASHES[id(plan)][1]
 
 
 def cells_of(plan: FloorPlan) -> int:
-    """How many free cells an apartment has."""
+    """Return the number of free cells of an apartment."""
     key = plan_hash(plan)
     if key not in _CELLS:
         _CELLS[key] = build_grid(plan).cells
@@ -135,15 +140,17 @@ def cells_of(plan: FloorPlan) -> int:
 
 
 class PerApartment(Stage):
-    """A stage that leaves one file for each apartment.
+    """Stage with one file per apartment.
 
-    The fingerprint of a file depends on its own apartment only, so that another apartment in the
-    split makes none of them anew.
+    The fingerprint of a file depends on its own apartment only, so other apartments may be added to
+    the split without rebuilding it.
 
     Parameters
     ----------
     cfg : DictConfig
+        Config of a command.
     apartments : Apartments
+        Apartments of the files.
     """
 
     def __init__(self, cfg: DictConfig, apartments: Apartments) -> None:
@@ -151,24 +158,24 @@ class PerApartment(Stage):
         self.apartments = apartments
 
     def consulted(self) -> Sequence[str]:
-        """The split, whose floor plans are in the fingerprint."""
+        """Return the key of the split; the fingerprint holds its floor plans instead."""
         return (self.apartments.world.split,)
 
     @property
     def folder(self) -> Path:
-        """Where the folders of the apartments lie."""
+        """Parent of the apartments' folders."""
         return Path(self.cfg.outputs) / "generate"
 
     @cached_property
     def fingerprints(self) -> list[str]:
-        """The fingerprint of each apartment's file."""
+        """Fingerprint of each apartment's file."""
         plans, needs = self.apartments.plans, self.needed
-        own = values(self.cfg, self.settings(), self.ignored())
+        settings = values(self.cfg, self.settings(), self.ignored())
         return [
             digest(
                 self.kind,
                 self.version,
-                own,
+                settings,
                 self.content(),
                 self.content_of(plan),
                 [_of_apartment(need, self.apartments, index) for need in needs],
@@ -178,33 +185,33 @@ class PerApartment(Stage):
 
     @cached_property
     def fingerprint(self) -> str:
-        """The fingerprint of all files together."""
+        """Fingerprint of all files together."""
         return digest(self.fingerprints)
 
     def content_of(self, plan: FloorPlan) -> Any:
-        """What enters the fingerprint of an apartment's file besides."""
+        """Return further content of the fingerprint of an apartment's file."""
         return None
 
     @abstractmethod
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
-        """The file of an apartment."""
+        """Return the path of an apartment's file."""
 
     @property
     def paths(self) -> list[Path]:
-        """The files, in the order of the apartments."""
+        """Paths of the files, in the order of the apartments."""
         pairs = zip(self.apartments.plans, self.fingerprints, strict=True)
-        return [self.path_of(plan, own) for plan, own in pairs]
+        return [self.path_of(plan, fingerprint) for plan, fingerprint in pairs]
 
     def locks(self) -> Sequence[Path]:
-        """The files that are missing; sorted, so that two processes never wait for each other."""
+        """Return the missing files; sorted, so that two processes never wait for each other."""
         return sorted(path for path in self.paths if not path.is_file())
 
     def missing(self) -> list[int]:
-        """Which apartments have no file yet, by number."""
+        """Return the indices of the apartments without a file."""
         return [index for index, path in enumerate(self.paths) if not path.is_file()]
 
     def done(self) -> bool:
-        """Whether each apartment has its file."""
+        """Return whether each apartment has its file."""
         return not self.missing()
 
 
@@ -215,7 +222,7 @@ def _of_apartment(need: Stage, apartments: Apartments, index: int) -> str:
 
 
 def scene_folder(cfg: DictConfig, plan: FloorPlan) -> Path:
-    """The folder of an apartment: `outputs/generate/<apartment>-<hash8 of its floor plan>`."""
+    """Return an apartment's folder, `outputs/generate/<apartment>-<hash8 of its floor plan>`."""
     if not cfg.outputs:
         raise UserError("outputs: empty; give the path of a folder")
     return Path(cfg.outputs) / "generate" / f"{plan.name}-{plan_hash(plan)[:8]}"

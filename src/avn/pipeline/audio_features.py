@@ -1,4 +1,4 @@
-"""Audio embeddings, the sound network's last layer of every clip, as a stage."""
+"""Stage of audio embeddings: features of the sound network for every clip."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from avn.pipeline.sound_network import SoundNetwork, SourceEstimates
 
 
 class AudioEmbeddings(AudioInference):
-    """What the sound network's last layer makes of every clip.
+    """Audio embeddings of every clip by the sound network.
 
-    Its product is (K, S, sounds, takes, D) float16 for each apartment; see
+    The product is (K, S, sounds, realisations, D) float16 per apartment; see
     `avn.modules.sound_cnn.SoundCnn.features`.
     """
 
@@ -24,39 +24,39 @@ class AudioEmbeddings(AudioInference):
 
     @property
     def network(self) -> SoundNetwork:
-        """The sound network."""
+        """Stage of the sound network."""
         return SoundNetwork(self.cfg)
 
-    def answer(self, model: Any) -> Callable[[Tensor], Tensor]:
-        """The last layer."""
-        found: Callable[[Tensor], Tensor] = model.features
-        return found
+    def output_of(self, model: Any) -> Callable[[Tensor], Tensor]:
+        """Return the function from clips to embeddings."""
+        features: Callable[[Tensor], Tensor] = model.features
+        return features
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         name, where = self.cfg.sound_model.name, self.apartments.title
         return f"audio embeddings by '{name}' in {where} ({self.clips.purpose})"
 
     def by_products(self) -> Sequence[SourceEstimates]:
-        """Source estimates of a network with `flip_tta`, which are the last two numbers."""
+        """Return the stage of source estimates, the last two features with `flip_tta`."""
         if self.clips != Clips() or not self.cfg.sound_model.get("flip_tta"):
             return ()
         return (SourceEstimates(self.cfg, self.apartments),)
 
     def locks(self) -> Sequence[Path]:
-        """The files that are missing, those of the by-product included."""
+        """Return the missing files, those of the by-product included."""
         others = [path for stage in self.by_products() for path in stage.locks()]
         return sorted([*super().locks(), *others])
 
     def opened(self) -> Callable[[int], Tensor]:
-        """Open the network and the scenes, and give what listens in one of them."""
-        listen, estimates = super().opened(), self.by_products()
+        """Load the network and the scenes; return the function from index to embeddings."""
+        infer_in, estimates = super().opened(), self.by_products()
 
         def embed(index: int) -> Tensor:
-            found = listen(index)
-            for own in estimates:
-                own.keep(index, found[..., -2:].contiguous())
-            return found.to(torch.float16)
+            embeddings = infer_in(index)
+            for stage in estimates:
+                stage.keep(index, embeddings[..., -2:].contiguous())
+            return embeddings.to(torch.float16)
 
         return embed

@@ -1,4 +1,4 @@
-"""What a network makes of every clip of an apartment, once for all episodes in it."""
+"""Inference of audio networks on every clip of an apartment, once for all episodes."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ from avn.pipeline.trained_on_clips import TrainedOnClips
 
 # Clips rendered at once; more would leave the caches of a CPU.
 BATCH = 96
-# Draws the takes of what is heard; an episode draws among them from its own seed.
+# Seed of the realisations of clips; an episode samples among them with its own seed.
 HEARING_SEED = 0
 MOST_REALISATIONS = 1000
-# How fast two cores listen, roughly, to say how long it takes.
+# Rough speed of inference on two cores, for estimates of durations.
 CLIPS_PER_SECOND = 800
 
 
 @dataclass(frozen=True)
 class Clips:
-    """Which clips are listened to.
+    """Set of clip realisations.
 
     Attributes
     ----------
     realisations : str
-        The key of the config that says how many takes there are of each clip.
+        Config key of the number of realisations of each clip.
     purpose : {"eval", "train"}
-        Takes of the one are never those of the other.
+        Use of the clips; realisations of the two are disjoint.
     """
 
     realisations: str = "realisations"
@@ -57,14 +57,16 @@ class Clips:
 
 
 class AudioInference(ApartmentTensors):
-    """What a network makes of every clip of apartments.
+    """Stage of a network's outputs for every clip of apartments.
 
     Parameters
     ----------
     cfg : DictConfig
+        Config of a command.
     apartments : Apartments
-        The sounds and the microphone are those of their world.
-    clips : Clips
+        Apartments; sounds and microphone are those of their world.
+    clips : Clips, optional
+        Clip realisations; those of an evaluation by default.
     """
 
     def __init__(self, cfg: DictConfig, apartments: Apartments, clips: Clips | None = None) -> None:
@@ -74,32 +76,32 @@ class AudioInference(ApartmentTensors):
     @property
     @abstractmethod
     def network(self) -> TrainedOnClips:
-        """The stage of the network that listens."""
+        """Stage of the network."""
 
-    def answer(self, model: Any) -> Callable[[Tensor], Tensor]:
-        """What is made of a batch of clips."""
-        found: Callable[[Tensor], Tensor] = model
-        return found
+    def output_of(self, model: Any) -> Callable[[Tensor], Tensor]:
+        """Return the function from a batch of clips to outputs; the model by default."""
+        forward: Callable[[Tensor], Tensor] = model
+        return forward
 
     @property
     def realisations(self) -> int:
-        """How many takes there are of each clip."""
+        """Number of realisations of each clip."""
         return int(OmegaConf.select(self.cfg, self.clips.realisations))
 
     def needs(self) -> Sequence[Any]:
-        """The network, and the sound of the apartments."""
+        """Return the stages of the network and of the apartments' acoustics."""
         return (self.network, DirectSound(self.cfg, self.apartments))
 
     def settings(self) -> Sequence[str]:
-        """The microphone, and how many takes there are."""
+        """Return the keys of the microphone and of the number of realisations."""
         return (self.apartments.world.microphone, self.clips.realisations)
 
     def consulted(self) -> Sequence[str]:
-        """The sounds, whose recordings are in the fingerprint."""
+        """Return the keys of split and sounds; the fingerprint holds their content instead."""
         return (*super().consulted(), self.apartments.world.sounds)
 
     def content(self) -> Any:
-        """The recordings, and what draws the takes."""
+        """Return the hashes of the recordings, and the seeds of the realisations."""
         return (
             sounds_content(self.cfg, self.apartments.world),
             self.clips.purpose,
@@ -107,12 +109,12 @@ class AudioInference(ApartmentTensors):
         )
 
     def seconds(self) -> float:
-        """By the number of clips."""
+        """Estimate the duration from the number of clips."""
         sounds = len(sound_files(self.cfg, self.apartments.world))
         return 4 * self.apartments.pairs * sounds * self.realisations / CLIPS_PER_SECOND
 
     def check(self) -> None:
-        """Refuse a number of realisations that cannot be, and clips of another sampling rate."""
+        """Refuse a number of realisations that is out of range, and another sampling rate."""
         rate, known = self.apartments.node("acoustics").rate, self.network.rate
         if rate != known:
             raise UserError(
@@ -126,14 +128,14 @@ class AudioInference(ApartmentTensors):
             )
 
     def opened(self) -> Callable[[int], Tensor]:
-        """Open the network and the scenes, and give what listens in one of them."""
+        """Load the network and the scenes; return the function from index to outputs."""
         network, sound = self.needs()
         model, scenes = network.load(), sound.load()
         sounds = dry_sounds(self.cfg, self.apartments.world)
         microphone = build_object("microphone", self.apartments.node("microphone"))
 
-        def listen(index: int) -> Tensor:
-            return hear(
+        def infer_in(index: int) -> Tensor:
+            return infer(
                 scenes[index],
                 sounds,
                 model,
@@ -141,13 +143,13 @@ class AudioInference(ApartmentTensors):
                 microphone,
                 seed=HEARING_SEED,
                 purpose=self.clips.purpose,
-                answer=self.answer(model),
+                output=self.output_of(model),
             )
 
-        return listen
+        return infer_in
 
 
-def hear(
+def infer(
     scene: AudibleScene,
     sounds: DrySounds,
     model: AudioNetwork,
@@ -156,97 +158,101 @@ def hear(
     seed: int = 0,
     progress: bool = True,
     purpose: str = "eval",
-    answer: Callable[[Tensor], Tensor] | None = None,
+    output: Callable[[Tensor], Tensor] | None = None,
 ) -> Tensor:
-    """Listen in every state to every source, with every sound, in each evaluation take.
+    """Apply a network to the clips of every source, state, sound and realisation.
 
     Parameters
     ----------
     scene : AudibleScene
-        An apartment with K sources and S = 4 C states.
+        Apartment with K sources and S = 4 C states.
     sounds : DrySounds
+        Recordings.
     model : AudioNetwork
-        Trained; it is set to evaluation.
+        Trained network; it is set to evaluation.
     realisations : int
-        Takes 0 to `realisations` - 1 of the purpose.
+        Number of realisations of each clip.
     microphone : Microphone
+        Microphone of the agent.
     seed : int
-        Draws the takes.
+        Seed of the realisations.
     progress : bool
-        Whether a bar with rate and time left is shown.
+        Whether a progress bar is shown.
     purpose : {"eval", "train"}
-        Takes of the one are never those of the other.
-    answer : callable, optional
-        What is made of clips; by default what the model says.
+        Use of the clips; realisations of the two are disjoint.
+    output : callable, optional
+        Function from clips to outputs; `model` by default.
 
     Returns
     -------
-    (K, S, sounds, takes, ...) float32 tensor
-        The model's answer to each clip; for the sound network 2 metres, right and front.
+    (K, S, sounds, realisations, ...) float32 tensor
+        Output for each clip; for the sound network 2 metres, right and front.
     """
     brirs = scene.brirs
     renderer = ClipRenderer(sounds, microphone, seed, purpose)
     sources, states = len(scene.sources), 4 * len(scene.grid.lattice)
     source, state = torch.cartesian_prod(torch.arange(sources), torch.arange(states)).unbind(1)
-    each = len(sounds.names) * realisations
+    clips_per_pair = len(sounds.names) * realisations
     sound, realisation = torch.cartesian_prod(
         torch.arange(len(sounds.names)), torch.arange(realisations)
     ).T
-    heard: list[Tensor] = []
+    outputs: list[Tensor] = []
     model.eval()
-    what = f"listening in {scene.name}"
-    bar = progress_bar(what, len(source) * each, "clips") if progress else nullcontext(_silent)
+    what, total = f"listening in {scene.name}", len(source) * clips_per_pair
+    bar = progress_bar(what, total, "clips") if progress else nullcontext(_silent)
 
     @torch.inference_mode()
-    def listen(rows: Tensor) -> Tensor:
+    def infer_pairs(rows: Tensor) -> Tensor:
         # Whole pairs, so that an impulse response is transformed once for all its clips.
         spectra = brir_spectra(brirs.gather(source[rows], state[rows]), sounds.rate)
-        index = torch.arange(len(rows)).repeat_interleave(each)
+        index = torch.arange(len(rows)).repeat_interleave(clips_per_pair)
         repeated = sound.repeat(len(rows)), realisation.repeat(len(rows))
         clip = ClipId(source[rows][index], state[rows][index], *repeated)
         clips = renderer.render(spectra, clip, index)
-        return (answer or model)(clips.to(model.device)).cpu()
+        return (output or model)(clips.to(model.device)).cpu()
 
-    threads, parts = torch.get_num_threads(), torch.arange(len(source)).split(max(1, BATCH // each))
+    threads = torch.get_num_threads()
+    batches = torch.arange(len(source)).split(max(1, BATCH // clips_per_pair))
     with bar as advance, threads_for_one_operation(1):
-        for found in prefetch(listen, parts, threads):
-            heard.append(found)
-            advance(len(found))
-    return torch.cat(heard).unflatten(0, (sources, states, len(sounds.names), realisations))
+        for batch in prefetch(infer_pairs, batches, threads):
+            outputs.append(batch)
+            advance(len(batch))
+    return torch.cat(outputs).unflatten(0, (sources, states, len(sounds.names), realisations))
 
 
 def _silent(count: int) -> None:
     """Show no progress."""
 
 
-def sound_errors(scene: Scene, heard: Tensor, sounds: Sequence[str]) -> pd.DataFrame:
-    """Report how far what is heard lies from where the sources are.
+def source_estimate_errors(scene: Scene, estimates: Tensor, sounds: Sequence[str]) -> pd.DataFrame:
+    """Compute the errors of source estimates by sound and sight.
 
     Parameters
     ----------
     scene : Scene
-    heard : (K, S, sounds, takes, 2) float32 tensor
-        As `hear` gives it.
+        Apartment with K sources and S states.
+    estimates : (K, S, sounds, realisations, 2) float32 tensor
+        Metres right and front, as `infer` gives them.
     sounds : sequence of str
-        Their names.
+        Names of the sounds.
 
     Returns
     -------
     DataFrame
-        A row for each sound, and `all`, in sight, out of sight and in both together. Columns:
-        room, sound, sight, clips, error_m and bearing_deg (medians), front_back (share of clips
-        whose bearing is off by more than 90 degrees).
+        A row for each sound and for `all`, in sight, out of sight and both together. Columns:
+        scene, sound, sight, clips, error_m and bearing_deg (medians), front_back (share of clips
+        with a bearing error of more than 90 degrees).
     """
     locations, visible = locate_sources(scene)
-    metres, degrees = location_errors(heard, locations[:, :, None, None])
+    metres, degrees = location_errors(estimates, locations[:, :, None, None])
     in_sight = visible[:, :, None, None].expand_as(metres)
     sight_masks = {"in_sight": in_sight, "out_of_sight": ~in_sight, "all": in_sight | True}
     rows = []
     for index, name in enumerate((*sounds, "all")):
-        chosen = slice(None) if name == "all" else slice(index, index + 1)
+        columns = slice(None) if name == "all" else slice(index, index + 1)
         for sight, mask in sight_masks.items():
-            picked = mask[:, :, chosen]
-            m, d = metres[:, :, chosen][picked].numpy(), degrees[:, :, chosen][picked].numpy()
+            clips = mask[:, :, columns]
+            m, d = metres[:, :, columns][clips].numpy(), degrees[:, :, columns][clips].numpy()
             rows.append(
                 {
                     "scene": scene.name,

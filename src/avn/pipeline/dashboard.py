@@ -1,4 +1,4 @@
-"""What the terminal shows while a table is made: stages, bars, time left, rows as they fill."""
+"""Live display of a table in progress: stages, progress bars, time left, finished rows."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ _OTHERS = 8
 
 
 class Dashboard:
-    """A live display on the error stream; it shows nothing where that is no terminal.
+    """Live display on the standard error stream; without a terminal nothing is shown.
 
     Parameters
     ----------
     stages : sequence of (str, float)
-        What is missing, in the order in which it is made: title and expected seconds.
+        Missing stages in the order of their making: title and expected seconds.
     rows : sequence of str
-        The rows of the table.
+        Names of the table's rows.
     paper : dict of str to str
-        What the paper says of a row.
+        The paper's results by row.
     console : Console, optional
-        Where it is shown, in place of the error stream.
+        Console to use instead of the standard error stream.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class Dashboard:
         self._open = ExitStack()
 
     def __enter__(self) -> Dashboard:
+        """Start the display and the clock."""
         if self._console.is_terminal:
             self._open.enter_context(bars_in(self._bars))
             live = Live(
@@ -69,20 +70,27 @@ class Dashboard:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """Stop the display.
+
+        Parameters
+        ----------
+        kind, error, trace
+            Exception that left the block; unused.
+        """
         self._open.close()
 
     def made(self) -> None:
-        """The stage that was being made is there; the next one begins."""
+        """Mark the current stage as finished and the next one as begun."""
         now = time.monotonic()
         self._took.append(now - self._began)
         self._began = now
 
     def fill(self, row: str, text: str) -> None:
-        """Show what has come of a row so far."""
+        """Show the result of a row so far."""
         self._rows[row] = text
 
     def time_left(self) -> float:
-        """Seconds that it still takes, at the pace of the stages that were made."""
+        """Estimate the seconds left, at the pace of the finished stages."""
         planned = [seconds for _, seconds in self._stages]
         done = len(self._took)
         expected = sum(planned[:done])
@@ -93,7 +101,7 @@ class Dashboard:
         return current + pace * sum(planned[done + 1 :])
 
     def render(self) -> RenderableType:
-        """All of it."""
+        """Return the whole display."""
         passed = format_duration(time.monotonic() - self._started)
         left = f"{passed} passed, about {format_duration(self.time_left())} left"
         return Group(Text(left, style="bold"), self._row_table(), self._stage_table(), self._bars)

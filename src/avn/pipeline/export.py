@@ -1,4 +1,4 @@
-"""The apartments of a split, made whole, drawn, and exported for listening."""
+"""Generation of a split's apartments, with drawings and exported clips."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from avn.core.progress import log
 from avn.core.settings import leaves
 from avn.dataset.scene import AudibleScene, Scene
 from avn.dataset.views import Views
-from avn.pipeline.apartments import apartments_of_every_part
+from avn.pipeline.apartments import apartments_of_all_subsets
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds
 from avn.pipeline.stage import Stage, make, missing
@@ -28,17 +28,17 @@ EXPORTS = ("wav",)
 
 
 def generate(cfg: DictConfig) -> Path:
-    """Make all scenes of the split, draw plans and contact sheets, and export what is asked for.
+    """Build all scenes of the split, draw plans and contact sheets, and write the exports.
 
     Parameters
     ----------
     cfg : DictConfig
-        Of `avn.generate`.
+        Config of `avn.generate`.
 
     Returns
     -------
     Path
-        The folder that the folders of the apartments lie in.
+        Parent of the apartments' folders.
 
     Raises
     ------
@@ -51,29 +51,29 @@ def generate(cfg: DictConfig) -> Path:
         raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
     for stage in missing(stages_of(cfg)):
         make(stage, explicit=True)
-    every: list[AudibleScene] = []
-    for apartments in apartments_of_every_part(cfg):
+    scenes: list[AudibleScene] = []
+    for apartments in apartments_of_all_subsets(cfg):
         sound, rendered = DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
         for scene, views in zip(sound.load(), rendered.load(), strict=True):
             _draw(cfg, scene, views)
             _report(cfg, scene)
-            every.append(scene)
+            scenes.append(scene)
     if cfg.export == "wav":
-        _export(cfg, _chosen(cfg, every))
+        _export(cfg, _selected(cfg, scenes))
     return Path(cfg.outputs) / "generate"
 
 
 def stages_of(cfg: DictConfig) -> list[Stage]:
-    """The sound and the views of every part of the split."""
-    every = apartments_of_every_part(cfg)
-    return [kind(cfg, own) for kind in (DirectSound, RenderedViews) for own in every]
+    """Return the stages of acoustics and views of all subsets of the split."""
+    subsets = apartments_of_all_subsets(cfg)
+    return [kind(cfg, subset) for kind in (DirectSound, RenderedViews) for subset in subsets]
 
 
 def settings_of(cfg: DictConfig) -> set[str]:
-    """Leaf keys of the config that are read."""
-    own = ["apartments", "export", "clips"]
+    """Return the leaf keys of the config that are read."""
+    keys = ["apartments", "export", "clips"]
     heard = ["sound", "microphone"] if cfg.export == "wav" else []
-    return leaves(cfg, [*own, *heard]).union(*(stage.read() for stage in stages_of(cfg)))
+    return leaves(cfg, [*keys, *heard]).union(*(stage.read() for stage in stages_of(cfg)))
 
 
 def _draw(cfg: DictConfig, scene: AudibleScene, views: Views) -> None:
@@ -93,45 +93,45 @@ def _report(cfg: DictConfig, scene: AudibleScene) -> None:
     )
 
 
-def _chosen(cfg: DictConfig, every: list[AudibleScene]) -> list[AudibleScene]:
-    names = [which.name for which in every]
+def _selected(cfg: DictConfig, scenes: list[AudibleScene]) -> list[AudibleScene]:
+    names = [scene.name for scene in scenes]
     for name in cfg.apartments:
         if name not in names:
             raise UserError(f"apartments: '{name}' is none of {', '.join(names)}")
-    return [which for which in every if not cfg.apartments or which.name in cfg.apartments]
+    return [scene for scene in scenes if not cfg.apartments or scene.name in cfg.apartments]
 
 
-def _export(cfg: DictConfig, chosen: list[AudibleScene]) -> None:
+def _export(cfg: DictConfig, scenes: list[AudibleScene]) -> None:
     sounds = dry_sounds(cfg)
     render = ClipRenderer(
         sounds, build_object("microphone", cfg.microphone), seed=0, purpose="eval"
     )
-    for which in chosen:
-        pairs = [tuple(pair) for pair in cfg.clips] or _near_and_far(which)
-        _check_pairs(which, pairs)
+    for scene in scenes:
+        pairs = [tuple(pair) for pair in cfg.clips] or _near_and_far(scene)
+        _check_pairs(scene, pairs)
         source, state = (torch.tensor(column) for column in zip(*pairs, strict=True))
-        spectra = brir_spectra(which.brirs.gather(source, state), sounds.rate)
+        spectra = brir_spectra(scene.brirs.gather(source, state), sounds.rate)
         for index, name in enumerate(sounds.names):
             sound = torch.full_like(source, index)
             clips = render.render(spectra, ClipId(source, state, sound, torch.zeros_like(source)))
             for (k, s), clip in zip(pairs, clips, strict=True):
                 file = f"{name}-{cfg.acoustics.name}-source{k}-state{s}.wav"
-                export_wav(which.folder / "wav" / file, clip, sounds.rate)
-        log(f"{which.name}: {len(pairs) * len(sounds)} clips in {which.folder / 'wav'}")
+                export_wav(scene.folder / "wav" / file, clip, sounds.rate)
+        log(f"{scene.name}: {len(pairs) * len(sounds)} clips in {scene.folder / 'wav'}")
 
 
-def _near_and_far(which: Scene) -> list[tuple[int, int]]:
-    """States facing north at a quarter, half and all of the way from the first source."""
-    moves = which.grid.distances[which.sources[0]]
+def _near_and_far(scene: Scene) -> list[tuple[int, int]]:
+    """Return states facing north at 25, 50 and 100 % of the cells by distance to the source."""
+    moves = scene.grid.distances[scene.sources[0]]
     order = moves.argsort(kind="stable")
     return [(0, 4 * int(order[int(share * (len(order) - 1))])) for share in (0.25, 0.5, 1.0)]
 
 
-def _check_pairs(which: Scene, pairs: list[tuple[int, int]]) -> None:
-    sources, states = len(which.sources), 4 * which.grid.cells
+def _check_pairs(scene: Scene, pairs: list[tuple[int, int]]) -> None:
+    sources, states = len(scene.sources), 4 * scene.grid.cells
     for pair in pairs:
         if len(pair) != 2 or not (0 <= pair[0] < sources and 0 <= pair[1] < states):
             raise UserError(
-                f"clips: {list(pair)} is no [source, state] of {which.name}, which has sources 0 "
+                f"clips: {list(pair)} is no [source, state] of {scene.name}, which has sources 0 "
                 f"to {sources - 1} and states 0 to {states - 1}"
             )

@@ -1,4 +1,4 @@
-"""`film=4` of `avn.eval`: films of some episodes of a run, with the sound that the agent hears."""
+"""Films of a run's episodes with the sound that the agent hears (`film` of `avn.eval`)."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from avn.core.hashing import digest
 from avn.core.progress import format_duration, log
 from avn.core.settings import leaves, plain
 from avn.pipeline import replay
-from avn.pipeline.observed import Perceived, observed_stages, soundtrack
+from avn.pipeline.observed import RunObservations, observed_stages, soundtrack
 from avn.pipeline.replay import Run
 from avn.pipeline.run import read_run
 from avn.reporting.film import write_film
 
 FOLDER = "films"
-# Holds the fingerprint of what the films of a folder were made from.
+# Holds the fingerprint of the films of a folder.
 _MARK = ".made_from"
 MOST = 1000
 
 
 def check(cfg: DictConfig) -> None:
-    """Refuse `film` and `film_show` that cannot work, before anything is walked."""
+    """Refuse values of `film` and `film_show` that cannot work, before the run starts."""
     if not 0 <= cfg.film <= MOST:
         raise UserError(f"film: {cfg.film} is out of range; give how many, 0 to {MOST}")
     if cfg.film_show not in replay.SHOWS:
@@ -32,7 +32,7 @@ def check(cfg: DictConfig) -> None:
 
 
 def read(cfg: DictConfig) -> set[str]:
-    """Leaf keys of the config that films read beyond what their run does."""
+    """Return the leaf keys of the config that films read in addition to their run."""
     if not cfg.film:
         return set()
     stages = observed_stages(cfg)
@@ -44,19 +44,19 @@ def read(cfg: DictConfig) -> set[str]:
 def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
     """Write up to `film` films of a finished run.
 
-    Those that are there stay as they are, unless views or microphone are others now.
+    Existing films are kept unless views or microphone have changed.
 
     Parameters
     ----------
     cfg : DictConfig
-        Of `avn.eval`: `film` says how many, `film_show` which.
+        Config of `avn.eval`: `film` is the number of films, `film_show` selects episodes.
     folder : Path
-        The run's.
+        Folder of the run.
 
     Returns
     -------
     list of Path
-        The films.
+        Files of the films.
     """
     if not cfg.film:
         return []
@@ -74,13 +74,13 @@ def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
 
 
 def _make_missing(run: Run, paths: dict[int, Path]) -> None:
-    """Write the films that are not there, or were made of other views or another microphone."""
-    mark, made_from = run.folder / FOLDER / _MARK, _fingerprint(run.cfg)
-    if not (mark.is_file() and mark.read_text() == made_from):
+    """Write the missing films; delete films of other views or another microphone first."""
+    mark, fingerprint = run.folder / FOLDER / _MARK, _fingerprint(run.cfg)
+    if not (mark.is_file() and mark.read_text() == fingerprint):
         for old in (run.folder / FOLDER).glob("*.mp4"):
             old.unlink()
         with atomic_write(mark) as part:
-            part.write_text(made_from)
+            part.write_text(fingerprint)
     missing = {label: path for label, path in paths.items() if not path.is_file()}
     if missing:
         what = "film" if len(missing) == 1 else f"{len(missing)} films"
@@ -90,7 +90,7 @@ def _make_missing(run: Run, paths: dict[int, Path]) -> None:
 
 
 def _fingerprint(cfg: DictConfig) -> str:
-    """What films depend on besides the run itself."""
+    """Return the fingerprint of the films' inputs besides the run itself."""
     stages = [stage.fingerprint for stage in observed_stages(cfg)]
     return digest(stages, plain(cfg, "microphone"))
 
@@ -102,8 +102,8 @@ def _name(run: Run, label: int) -> str:
 
 
 def _write(run: Run, paths: dict[int, Path]) -> None:
-    perceived = Perceived(run)
+    observations = RunObservations(run)
     for trace, path in zip(replay.traces(run, list(paths)), paths.values(), strict=True):
-        clips = perceived.clips(trace)
-        views = perceived.views(trace.place.name, trace.state)
+        clips = observations.clips(trace)
+        views = observations.views(trace.place.name, trace.state)
         write_film(path, trace, str(run.cfg.agent.name), views, clips, soundtrack(clips))

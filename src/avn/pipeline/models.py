@@ -1,4 +1,4 @@
-"""What `avn.train` trains, by name."""
+"""Models of `avn.train` by name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from avn.pipeline.stage import build
 from avn.pipeline.stop_classifier import StopNetwork
 from avn.pipeline.trained import Trained
 
-# The stage of each model, and how the metrics begin that are shown, over all sounds.
+# Stage of each model, and prefixes of the metrics over all sounds that are printed.
 MODELS: dict[str, tuple[type[Trained], tuple[str, ...]]] = {
     "sound_cnn": (SoundNetwork, ("error_m/", "bearing_deg/")),
     "stop_classifier": (
@@ -27,7 +27,7 @@ MODELS: dict[str, tuple[type[Trained], tuple[str, ...]]] = {
 
 
 def model_of(cfg: DictConfig) -> Trained:
-    """The stage of the model that `avn.train` is to train.
+    """Return the stage of the model that the config names.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def model_of(cfg: DictConfig) -> Trained:
 
 
 def train_model(stage: Trained) -> dict[str, float]:
-    """Train a model, or open it where it is trained.
+    """Train a model, or read it where it is trained.
 
     Returns
     -------
@@ -52,14 +52,14 @@ def train_model(stage: Trained) -> dict[str, float]:
     Raises
     ------
     UserError
-        Where what it needs is missing and `auto` is false, or it is damaged.
+        Where an input is missing and `auto` is false, or the model is damaged.
     """
     build(stage, explicit=True)
-    stage.load()  # a damaged checkpoint is told now
-    metrics, begin = stage.metrics(), MODELS[stage.cfg.model.name][1]
+    stage.load()  # refuses a damaged checkpoint
+    metrics, prefixes = stage.metrics(), MODELS[stage.cfg.model.name][1]
     by_sound = sound_files(stage.cfg, TRAINING)
     return {
         name: metrics[name]
         for name in sorted(metrics)
-        if name.startswith(begin) and name.split("/")[-1] not in by_sound
+        if name.startswith(prefixes) and name.split("/")[-1] not in by_sound
     }

@@ -1,4 +1,4 @@
-"""What agents hear and see: a table of observations, each with the stage that makes it."""
+"""Table of the agents' observations, each with the stage that computes it."""
 
 from __future__ import annotations
 
@@ -18,43 +18,43 @@ from avn.navigation.observations import SceneObservations
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
-from avn.pipeline.occupancy import LocalPatches, sees_windows, true_windows
-from avn.pipeline.sound_network import SourceEstimates, hears
+from avn.pipeline.occupancy import LocalPatches, has_occupancy_model, true_local_patches
+from avn.pipeline.sound_network import SourceEstimates, has_sound_model
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stop_classifier import StopProbabilities, can_stop
+from avn.pipeline.stop_classifier import StopProbabilities, has_stop_model
 from avn.pipeline.views import RenderedViews
 from avn.pipeline.visual_features import VisualEmbeddings
 
-# What every agent observes without any stage.
+# Observations that every agent has without any stage.
 OWN = ("collided", "odometry")
 
 
 @dataclass(frozen=True)
 class Observation:
-    """Something that an agent may observe in each state.
+    """Kind of observation that an agent may have in each state.
 
     Attributes
     ----------
     shape : str
-        What one observation of one agent is.
+        Shape and meaning of one observation of one agent.
     audio : bool
-        Whether it is of clips, (K, S, sounds, realisations, ...), or of states, (S, ...).
+        Whether its tensors are by clip, (K, S, sounds, realisations, ...), or by state, (S, ...).
     stage : callable
-        Config, apartments and clips to the stage that makes it.
+        Function of config, apartments and clips; returns the stage that computes it.
     load : callable
-        That stage to a tensor for each apartment.
+        Function of that stage; returns a tensor for each apartment.
     there : callable
-        Whether a config has what makes it.
+        Function of the config; returns whether it has the network that computes it.
     hint : str
-        What to do where it has not.
+        Advice for a config without that network, for messages.
     truth : str, optional
-        The part of `agent.oracle_inputs` that stands in for it.
+        Entry of `agent.oracle_inputs` that replaces it by ground truth.
     true : callable, optional
-        Apartments and their scenes to the true tensors.
+        Function of apartments and scenes; returns the ground-truth tensors.
     settings : tuple of str
-        Keys of the config that shape it beyond its stage.
+        Keys of the config that change it in addition to those of its stage.
     true_settings : tuple of str
-        Keys of the config that shape the truth.
+        Keys of the config that change its ground truth.
     """
 
     shape: str
@@ -79,7 +79,7 @@ def _true_estimates(apartments: Apartments, scenes: Sequence[Scene]) -> list[Ten
 
 def _true_patches(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
     camera = typed(apartments.cfg.renderer.camera)
-    both = [true_windows(plan, camera) for plan in apartments.plans]
+    both = [true_local_patches(plan, camera) for plan in apartments.plans]
     return [torch.where(visible, free.float(), torch.nan) for free, visible in both]
 
 
@@ -90,7 +90,7 @@ OBSERVATIONS = {
         audio=True,
         stage=SourceEstimates,
         load=SourceEstimates.load,
-        there=hears,
+        there=has_sound_model,
         truth="source_estimate",
         true=_true_estimates,
     ),
@@ -100,7 +100,7 @@ OBSERVATIONS = {
         audio=True,
         stage=StopProbabilities,
         load=StopProbabilities.load,
-        there=can_stop,
+        there=has_stop_model,
     ),
     "audio_embedding": Observation(
         shape="(D,): last layer of the sound network",
@@ -108,7 +108,7 @@ OBSERVATIONS = {
         audio=True,
         stage=AudioEmbeddings,
         load=AudioEmbeddings.load,
-        there=hears,
+        there=has_sound_model,
     ),
     "view": Observation(
         shape="(3, H, W): uint8 picture",
@@ -136,27 +136,28 @@ OBSERVATIONS = {
         audio=False,
         stage=lambda cfg, apartments, clips: LocalPatches(cfg, apartments),
         load=LocalPatches.trusted,
-        there=sees_windows,
+        there=has_occupancy_model,
         truth="local_patch",
         true=_true_patches,
         settings=("mapper.visible_above",),
-        true_settings=tuple(f"renderer.camera.{own}" for own in ("height", "pitch", "fov")),
+        true_settings=tuple(f"renderer.camera.{key}" for key in ("height", "pitch", "fov")),
     ),
 }
 
 
 class Observed:
-    """Observations in the apartments of one part of a world.
+    """Observations in the apartments of one subset of a world.
 
     Parameters
     ----------
     apartments : Apartments
+        Apartments of the subset.
     names : sequence of str
-        Keys of `OBSERVATIONS`; others are left out, for an agent has them without any stage.
+        Keys of `OBSERVATIONS`; other names are left out, as they need no stage.
     clips : Clips, optional
-        Which clips are heard; those of an evaluation by default.
+        Clip realisations; those of an evaluation by default.
     truth : sequence of str
-        Parts in whose place the truth is shown.
+        Entries of `agent.oracle_inputs` that are replaced by ground truth.
     """
 
     def __init__(
@@ -171,20 +172,28 @@ class Observed:
         self.clips, self._truth = clips or Clips(), truth
 
     def is_true(self, name: str) -> bool:
-        """Whether an observation is the truth."""
+        """Return whether an observation is ground truth."""
         return OBSERVATIONS[name].truth in self._truth
 
     def check(self, agent: str, wanted: Sequence[str]) -> None:
-        """Refuse observations that do not exist, or that the config has nothing for.
+        """Refuse observations that do not exist or that the config has no network for.
 
         Parameters
         ----------
         agent : str
-            Who needs them, for the message.
+            Name of the agent, for messages.
         wanted : sequence of str
+            Names of the observations that the agent needs.
+
+        Raises
+        ------
+        UserError
+            For such an observation, or an entry of `agent.oracle_inputs` without any effect.
         """
         for truth in self._truth:
-            shown = [name for name, own in OBSERVATIONS.items() if own.truth == truth]
+            shown = [
+                name for name, observation in OBSERVATIONS.items() if observation.truth == truth
+            ]
             if shown and not set(shown) & set(wanted):
                 raise UserError(
                     f"agent.oracle_inputs: '{truth}' is nothing that agent {agent} observes"
@@ -194,13 +203,13 @@ class Observed:
             if name not in (*OBSERVATIONS, *OWN):
                 raise UserError(f"{start}; there are {', '.join((*OBSERVATIONS, *OWN))}")
             if name in self.names and not self.is_true(name):
-                own = OBSERVATIONS[name]
-                if not own.there(self.cfg):
-                    raise UserError(f"{start}: {own.hint}")
+                observation = OBSERVATIONS[name]
+                if not observation.there(self.cfg):
+                    raise UserError(f"{start}: {observation.hint}")
 
     @property
     def stages(self) -> dict[str, Any]:
-        """The stage of each observation that is not the truth and that the config can make."""
+        """Stages of the observations that are not ground truth and that the config has."""
         return {
             name: OBSERVATIONS[name].stage(self.cfg, self.apartments, self.clips)
             for name in self.names
@@ -209,11 +218,11 @@ class Observed:
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """Keys of the config that shape the observations beyond their stages."""
+        """Keys of the config that change the observations in addition to those of the stages."""
         keys: list[str] = []
         for name in self.names:
-            own = OBSERVATIONS[name]
-            keys += own.true_settings if self.is_true(name) else own.settings
+            observation = OBSERVATIONS[name]
+            keys += observation.true_settings if self.is_true(name) else observation.settings
         return tuple(dict.fromkeys(keys))
 
     def load(self, scenes: Sequence[Scene]) -> list[SceneObservations]:
@@ -222,22 +231,30 @@ class Observed:
         Parameters
         ----------
         scenes : sequence of Scene
-            Of the apartments.
+            Scenes of the apartments.
+
+        Returns
+        -------
+        list of SceneObservations
+            Observations in each scene.
         """
         observed: list[tuple[dict[str, Tensor], dict[str, Tensor]]] = [({}, {}) for _ in scenes]
         stages = self.stages
         for name in self.names:
-            own = OBSERVATIONS[name]
-            if self.is_true(name) and own.true:
-                tensors = own.true(self.apartments, scenes)
+            observation = OBSERVATIONS[name]
+            if self.is_true(name) and observation.true:
+                tensors = observation.true(self.apartments, scenes)
             else:
-                tensors = own.load(stages[name])
+                tensors = observation.load(stages[name])
             for (audio, visual), tensor in zip(observed, tensors, strict=True):
-                (audio if own.audio else visual)[name] = tensor
+                (audio if observation.audio else visual)[name] = tensor
         return [SceneObservations(_alike(audio), visual) for audio, visual in observed]
 
 
 def _alike(audio: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Audio observations with equal numbers of realisations; the truth has but one."""
-    most = max((own.shape[3] for own in audio.values()), default=1)
-    return {name: own.expand(*own.shape[:3], most, *own.shape[4:]) for name, own in audio.items()}
+    """Return audio observations with equal numbers of realisations; ground truth has only one."""
+    most = max((tensor.shape[3] for tensor in audio.values()), default=1)
+    return {
+        name: tensor.expand(*tensor.shape[:3], most, *tensor.shape[4:])
+        for name, tensor in audio.items()
+    }

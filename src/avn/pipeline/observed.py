@@ -1,4 +1,4 @@
-"""What was to be seen and heard at each step of a trace, for films and pages."""
+"""Views and clips at each step of a trace, for films and reports."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ _BATCH = 64
 
 
 def observed_stages(cfg: DictConfig) -> tuple[DirectSound, RenderedViews]:
-    """What pictures and clips of a run are made from."""
+    """Return the stages of a run's acoustics and views."""
     apartments = Apartments(cfg, cfg.subset)
     return DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
 
 
-class Perceived:
-    """Pictures and clips of a run's apartments, made where they are missing.
+class RunObservations:
+    """Views and clips in a run's apartments, built where they are missing.
 
-    Agents that do not see or hear stand at the same places: the pictures are what they would have
-    seen, and the clips what they would have heard.
+    They do not depend on the agent: agents without camera or microphone have them too.
 
     Parameters
     ----------
     run : Run
+        Finished run.
     """
 
     def __init__(self, run: Run) -> None:
@@ -49,18 +49,18 @@ class Perceived:
         build(sound)
         build(rendered)
         self._scenes = {scene.name: scene for scene in sound.load()}
-        self._views = dict(zip(self._scenes, (own.rgb for own in rendered.load()), strict=True))
+        self._views = dict(zip(self._scenes, (views.rgb for views in rendered.load()), strict=True))
         # the clips of `SourceEstimates`: same microphone, seed and purpose
         self._renderer = ClipRenderer(
             dry_sounds(cfg), build_object("microphone", cfg.microphone), HEARING_SEED, "eval"
         )
 
-    def views(self, room: str, states: Sequence[int] | NDArray[np.int64]) -> NDArray[np.uint8]:
-        """First-person views of some states of a room, (N, H, W, 3) uint8."""
-        return np.stack([self._views[room][int(state)] for state in states])
+    def views(self, scene: str, states: Sequence[int] | NDArray[np.int64]) -> NDArray[np.uint8]:
+        """Return first-person views of some states of a scene, (N, H, W, 3) uint8."""
+        return np.stack([self._views[scene][int(state)] for state in states])
 
     def clips(self, trace: Trace) -> Tensor:
-        """What is heard at each step, (T + 1, 2, rate) float32, left and right ear."""
+        """Return the clip of each step, (T + 1, 2, rate) float32, left and right ear."""
         brirs = self._scenes[trace.place.name].brirs
         state, realisation = torch.from_numpy(trace.state), torch.from_numpy(trace.realisation)
         parts = []
@@ -77,9 +77,9 @@ class Perceived:
 
 
 def soundtrack(clips: Tensor) -> NDArray[np.float32]:
-    """Clips one after the other, a second each, without a click where they meet.
+    """Concatenate clips of one second each, with cross-fades of 10 ms.
 
-    Each clip is periodic, so that it goes on for 10 ms while the next one is faded in over it.
+    Each clip is periodic, so it continues while the next one is faded in.
 
     Parameters
     ----------
@@ -88,8 +88,8 @@ def soundtrack(clips: Tensor) -> NDArray[np.float32]:
     Returns
     -------
     (rate T, 2) float32
-        Left and right; one factor for all brings the peak to 0.9, so that it grows louder on the
-        way to the source.
+        Left and right, scaled by one factor to a peak of 0.9: the level still rises on the way to
+        the source.
     """
     sound = clips.clone()
     rate = clips.shape[-1]

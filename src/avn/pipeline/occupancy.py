@@ -1,4 +1,4 @@
-"""The occupancy network and what it sees in every state, as stages."""
+"""Stages of the occupancy network and of its estimates in every state."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from avn.core.settings import plain, typed
 from avn.datamodules.views import ApartmentViews, ViewData
 from avn.dataset.scene import Scene
 from avn.dataset.views import Views
+from avn.modules.local_patch_metrics import calibrated, local_patch_metrics
 from avn.modules.occupancy_cnn import OccupancyCnn
-from avn.modules.window_metrics import calibrated, window_metrics
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.trained import Fitted
 from avn.pipeline.views import RenderedViews
@@ -32,23 +32,23 @@ from avn.reporting.local_patch_figures import LocalPatchFigures
 from avn.views.camera import CameraConfig
 from avn.views.local_patch_visibility import visible_cells
 
-# Views that are judged at once.
+# Views of a batch at inference.
 BATCH = 64
 
 
-def sees_windows(cfg: DictConfig) -> bool:
-    """Whether the config has an occupancy network."""
+def has_occupancy_model(cfg: DictConfig) -> bool:
+    """Return whether the config has an occupancy network."""
     return bool(cfg.occupancy_model.name != "none")
 
 
 class OccupancyNetwork(Fitted):
-    """The network that says which cells around the agent are free and which visible."""
+    """Stage of the network that estimates which cells ahead are free and which visible."""
 
     kind = "train/occupancy_cnn"
 
     def check(self) -> None:
-        """Refuse a config that has no such network."""
-        if not sees_windows(self.cfg):
+        """Refuse a config without an occupancy network."""
+        if not has_occupancy_model(self.cfg):
             raise UserError("occupancy_model: 'none' sees no free cells; choose small or released")
         if self.cfg.occupancy_model.appearances < 1:
             given = self.cfg.occupancy_model.appearances
@@ -56,34 +56,32 @@ class OccupancyNetwork(Fitted):
         super().check()
 
     def _views(self) -> list[RenderedViews]:
-        appearances = range(self.cfg.occupancy_model.appearances)
-        train = [
-            RenderedViews(self.cfg, self.train, appearance_seed) for appearance_seed in appearances
-        ]
+        seeds = range(self.cfg.occupancy_model.appearances)
+        train = [RenderedViews(self.cfg, self.train, seed) for seed in seeds]
         return [*train, RenderedViews(self.cfg, self.validation)]
 
     def needs(self) -> Sequence[Any]:
-        """Views of the training apartments in each look, and of the validation apartments."""
+        """Return the stages of training views in each appearance, and of validation views."""
         return self._views()
 
     def settings(self) -> Sequence[str]:
-        """The recipe."""
+        """Return the key of the training recipe."""
         return ("occupancy_model",)
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         recipe = self.cfg.occupancy_model
         settings = f"{self.cfg.renderer.name}, train_seed {recipe.train_seed}"
         return f"occupancy network '{recipe.name}' ({settings})"
 
     def seconds(self) -> float:
-        """By the number of views and of epochs."""
+        """Estimate the duration from the numbers of views and epochs."""
         recipe = self.cfg.occupancy_model
         return float(4 * self.train.cells * recipe.times * recipe.epochs / 90)
 
     def untrained(self) -> OccupancyCnn:
-        """The network before training."""
+        """Return the network with its initial weights."""
         recipe = self.cfg.occupancy_model
         torch.manual_seed(recipe.train_seed)
         model: OccupancyCnn = build_object(
@@ -92,11 +90,11 @@ class OccupancyNetwork(Fitted):
         return model
 
     def data(self) -> ViewData:
-        """Views and the true patches that they show."""
-        *appearances, others = (own.load() for own in self._views())
+        """Return the data module of views and true local patches."""
+        *train_views, validation_views = (stage.load() for stage in self._views())
         camera = typed(self.cfg.renderer.camera)
-        train = zip(self.train.plans, *appearances, strict=True)
-        validation = zip(self.validation.plans, others, strict=True)
+        train = zip(self.train.plans, *train_views, strict=True)
+        validation = zip(self.validation.plans, validation_views, strict=True)
         return ViewData(
             [_seen(plan, camera, views) for plan, *views in train],
             [_seen(plan, camera, views) for plan, *views in validation],
@@ -104,38 +102,38 @@ class OccupancyNetwork(Fitted):
         )
 
     def callbacks(self) -> Sequence[Callback]:
-        """What shows figures in TensorBoard."""
+        """Return callbacks that log figures to TensorBoard."""
         return (LocalPatchFigures(),)
 
     def measure(self, model: OccupancyCnn, data: ViewData) -> dict[str, Any]:
-        """Figures over all views of the validation apartments, and those of the prior beside."""
+        """Return metrics over all validation views, of the network and of the prior."""
         views = data.measured_views["validation"]
-        said = []
+        predictions = []
         with torch.inference_mode():
             for items in torch.arange(len(views)).split(BATCH):
                 log_odds = model.log_odds(views.__getitems__(items.tolist())["pictures"])
-                said.append(calibrated(log_odds, model.calibration)[:, 0])
+                predictions.append(calibrated(log_odds, model.calibration)[:, 0])
         free, prior = views.free.bool(), data.prior.expand(len(views), -1, -1)
-        figures: dict[str, Any] = {"prior": data.prior.tolist()}
-        for name, estimate in (("validation", torch.cat(said)), ("prior", prior)):
-            for figure, value in window_metrics(estimate, free, views.visible).items():
-                figures[figure.replace("/", f"/{name}/", 1)] = value
-        return figures
+        metrics: dict[str, Any] = {"prior": data.prior.tolist()}
+        for name, estimate in (("validation", torch.cat(predictions)), ("prior", prior)):
+            for metric, value in local_patch_metrics(estimate, free, views.visible).items():
+                metrics[metric.replace("/", f"/{name}/", 1)] = value
+        return metrics
 
     def prior(self) -> Tensor:
-        """How often each cell of a patch is free in the training apartments, (5, 5) float32."""
+        """Return the share of training states in which each cell is free, (5, 5) float32."""
         return torch.tensor(self.metrics()["prior"])
 
 
 def _seen(plan: FloorPlan, camera: CameraConfig, views: Sequence[Views]) -> ApartmentViews:
-    free, visible = true_windows(plan, camera)
+    free, visible = true_local_patches(plan, camera)
     return ApartmentViews(
         [v.rgb for v in views], [v.depth for v in views], free.numpy(), visible.numpy()
     )
 
 
-def true_windows(plan: FloorPlan, camera: CameraConfig) -> tuple[Tensor, Tensor]:
-    """Which cells of every state's window are free, and which visible, (S, 5, 5) bool each."""
+def true_local_patches(plan: FloorPlan, camera: CameraConfig) -> tuple[Tensor, Tensor]:
+    """Return which cells of every state's local patch are free and visible, (S, 5, 5) bool each."""
     grid = build_grid(plan)
     free = torch.from_numpy(window_cells(grid) >= 0)
     return free, torch.from_numpy(visible_cells(_surfaces(plan), grid, camera))
@@ -147,85 +145,104 @@ def _surfaces(plan: FloorPlan) -> Any:
 
 
 class LocalPatches(ApartmentTensors):
-    """How likely each cell around the agent is free, and how likely visible, by the network.
+    """Stage of local patches: the occupancy network's estimates in every state.
 
-    Its product is (S, 2, 5, 5) float32 for each apartment: free, then visible. Row r is r + 1
-    cells ahead, column c is c - 2 cells to the right.
+    The product is (S, 2, 5, 5) float32 per apartment: probabilities of free, then of visible. Row r
+    is r + 1 cells ahead, column c is c - 2 cells to the right.
     """
 
     kind = "see/local_patches"
 
     def needs(self) -> Sequence[Any]:
-        """The network, and the views."""
+        """Return the stages of the network and of the views."""
         return (OccupancyNetwork(self.cfg), RenderedViews(self.cfg, self.apartments))
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         return f"patches by '{self.cfg.occupancy_model.name}' in {self.apartments.title}"
 
     def seconds(self) -> float:
-        """About 10 ms a view."""
+        """Estimate 10 ms per view."""
         return 4 * self.apartments.cells / 100
 
     def opened(self) -> Callable[[int], Tensor]:
-        """Open the network and the views, and give what looks at those of an apartment."""
+        """Load the network and the views; return the function from index to local patches."""
         network, rendered = self.needs()
         model, views = network.load(), rendered.load()
         names = [plan.name for plan in self.apartments.plans]
-        return lambda index: judge_views(model, views[index], names[index])
+        return lambda index: infer_local_patches(model, views[index], names[index])
 
     def trusted(self) -> list[Tensor]:
-        """How likely each cell is free, (S, 5, 5), NaN where too little visible to tell."""
-        least = self.cfg.mapper.visible_above
-        return [torch.where(own[:, 1] >= least, own[:, 0], torch.nan) for own in self.load()]
+        """Return probabilities of free, (S, 5, 5); NaN where visible is below the threshold."""
+        threshold = self.cfg.mapper.visible_above
+        return [
+            torch.where(visible >= threshold, free, torch.nan)
+            for free, visible in (patches.unbind(1) for patches in self.load())
+        ]
 
 
 @torch.inference_mode()
-def judge_views(model: OccupancyCnn, views: Views, name: str) -> Tensor:
-    """Probabilities of free and of visible cells for every view, (S, 2, 5, 5) float32."""
-    rgb, found = views.rgb, []
-    with progress_bar(f"looking in {name}", len(rgb), "views") as advance:
-        for first in range(0, len(rgb), BATCH):
-            batch = torch.tensor(rgb[first : first + BATCH]).to(model.device)
-            found.append(model(batch).cpu())
-            advance(len(batch))
-    return torch.cat(found)
-
-
-def window_errors(
-    rooms: Sequence[Scene], camera: CameraConfig, estimates: Sequence[Tensor], prior: Tensor
-) -> pd.DataFrame:
-    """How well windows are known in each room and in all of them, beside the prior.
+def infer_local_patches(model: OccupancyCnn, views: Views, name: str) -> Tensor:
+    """Apply an occupancy network to every view of a scene.
 
     Parameters
     ----------
-    rooms : sequence of Scene
+    model : OccupancyCnn
+        Trained network.
+    views : Views
+        Views of S states.
+    name : str
+        Name of the scene, for the progress bar.
+
+    Returns
+    -------
+    (S, 2, 5, 5) float32 tensor
+        Probabilities of free, then of visible.
+    """
+    rgb, patches = views.rgb, []
+    with progress_bar(f"looking in {name}", len(rgb), "views") as advance:
+        for first in range(0, len(rgb), BATCH):
+            batch = torch.tensor(rgb[first : first + BATCH]).to(model.device)
+            patches.append(model(batch).cpu())
+            advance(len(batch))
+    return torch.cat(patches)
+
+
+def local_patch_errors(
+    scenes: Sequence[Scene], camera: CameraConfig, estimates: Sequence[Tensor], prior: Tensor
+) -> pd.DataFrame:
+    """Compute metrics of local patches in each scene and over all, of network and prior.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        Scenes of the estimates.
     camera : CameraConfig
-        Of the views; it says which cells are visible.
+        Camera of the views, which determines the visible cells.
     estimates : sequence of (S, 5, 5) tensors
-        How likely each cell is free.
+        Probability that each cell is free, by scene.
     prior : (5, 5) tensor
-        How often each cell is free in the training apartments.
+        Share of training states in which each cell is free.
 
     Returns
     -------
     DataFrame
-        Columns room, by (`network` or `prior`), cells (`all` or `visible`), accuracy, auc, ece and
-        loss; the last rows are of all rooms.
+        Columns scene, by (`network` or `prior`), cells (`all` or `visible`), accuracy, auc, ece and
+        loss; the last rows are over all scenes.
     """
-    truths = [true_windows(room.plan, camera) for room in rooms]
-    free, visible = (torch.cat(each) for each in zip(*truths, strict=True))
+    truths = [true_local_patches(scene.plan, camera) for scene in scenes]
+    free, visible = (torch.cat(tensors) for tensors in zip(*truths, strict=True))
     groups = [
-        (room.name, said, *truth)
-        for room, said, truth in zip(rooms, estimates, truths, strict=True)
+        (scene.name, estimate, *truth)
+        for scene, estimate, truth in zip(scenes, estimates, truths, strict=True)
     ]
     groups.append(("all", torch.cat(list(estimates)), free, visible))
     rows: list[dict[str, Any]] = []
-    for name, said, *truth in groups:
-        for by, estimate in (("network", said), ("prior", prior.expand_as(said))):
-            found = window_metrics(estimate, *truth)
+    for name, estimate, *truth in groups:
+        for by, prediction in (("network", estimate), ("prior", prior.expand_as(estimate))):
+            metrics = local_patch_metrics(prediction, *truth)
             for cells in ("all", "visible"):
-                own = {k.split("/")[0]: v for k, v in found.items() if k.endswith(f"/{cells}")}
-                rows.append({"scene": name, "by": by, "cells": cells, **own})
+                row = {k.split("/")[0]: v for k, v in metrics.items() if k.endswith(f"/{cells}")}
+                rows.append({"scene": name, "by": by, "cells": cells, **row})
     return pd.DataFrame(rows)

@@ -1,4 +1,4 @@
-"""What a network makes of apartments, as a stage with a tensor for each of them."""
+"""Base class of stages with a tensor per apartment."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ _FORMAT = 1
 
 
 class ApartmentTensors(PerApartment):
-    """A tensor for each apartment, in `outputs/<kind>/<apartment>-<hash8>.h5`."""
+    """Stage with a tensor per apartment, in `outputs/<kind>/<apartment>-<hash8>.h5`."""
 
     @abstractmethod
     def opened(self) -> Callable[[int], Tensor]:
-        """Open what is needed once, and give what makes the tensor of an apartment by number."""
+        """Load the needs once; return the function from an apartment's index to its tensor."""
 
     @property
     def folder(self) -> Path:
-        """Where the files lie."""
+        """Folder of the files."""
         return Path(self.cfg.outputs) / self.kind
 
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
-        """The file of an apartment."""
+        """Return the path of an apartment's file."""
         return self.folder / f"{plan.name}-{fingerprint[:8]}.h5"
 
     def make(self) -> None:
-        """Make the tensors that are missing."""
+        """Compute the missing tensors."""
         tensor_of = self.opened()
         for index in self.missing():
             self.keep(index, tensor_of(index))
 
-    def keep(self, index: int, found: Tensor) -> None:
-        """Write the tensor of an apartment, unless its file is there."""
+    def keep(self, index: int, tensor: Tensor) -> None:
+        """Write the tensor of an apartment, unless its file exists."""
 
         def fill(file: h5py.File) -> None:
-            file[_DATASET] = found.numpy()
+            file[_DATASET] = tensor.numpy()
 
         path = self.paths[index]
         if not path.is_file():
             scene_file.write(path, self.kind, _FORMAT, self.fingerprints[index], fill)
 
     def load(self) -> list[Tensor]:
-        """The tensor of each apartment.
+        """Return the tensor of each apartment.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""How far what a run's agent hears, sees and recognises lies from the truth, beside its records."""
+"""Tables of the errors of a run's networks: source estimates, local patches, localisation."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from avn.core.settings import typed
 from avn.dataset.scene import Scene
 from avn.mapping.place_errors import place_errors
 from avn.navigation.observations import SceneObservations
-from avn.pipeline.audio_inference import sound_errors
+from avn.pipeline.audio_inference import source_estimate_errors
 from avn.pipeline.observations import Observed
-from avn.pipeline.occupancy import OccupancyNetwork, window_errors
+from avn.pipeline.occupancy import OccupancyNetwork, local_patch_errors
 from avn.pipeline.sounds import sound_files
 from avn.reporting import perception_tables, results
 from avn.reporting.table import wide_console
@@ -33,35 +33,38 @@ TABLES = {
 
 def write(
     observed: Observed,
-    rooms: Sequence[Scene],
+    scenes: Sequence[Scene],
     walks: Sequence[NDArray[np.int64]],
     observations: Sequence[SceneObservations],
     folder: Path,
 ) -> None:
-    """Write a table for each thing that a network tells the agent of the rooms.
+    """Write an error table for each kind of network that the agent uses.
 
     Parameters
     ----------
     observed : Observed
-        What the agent observes.
-    rooms : sequence of Scene
+        Observations of the agent.
+    scenes : sequence of Scene
+        Scenes of the run.
     walks : sequence of (W, T) int64
-        Exploration walks in each room, as states.
+        Exploration walks in each scene, as states.
     observations : sequence of SceneObservations
-        What is heard and seen in each room.
+        Observations in each scene.
+    folder : Path
+        Folder of the run.
     """
     cfg, stages = observed.cfg, observed.stages
     if "source_estimate" in stages:
-        heard = [own.audio["source_estimate"] for own in observations]
-        results.write_csv(_heard(cfg, rooms, heard), folder / HEARD)
+        source_estimates = [one.audio["source_estimate"] for one in observations]
+        results.write_csv(_source_estimates(cfg, scenes, source_estimates), folder / HEARD)
     if "local_patch" in stages:
-        estimates = [own[:, 0] for own in stages["local_patch"].load()]
+        estimates = [patches[:, 0] for patches in stages["local_patch"].load()]
         prior = OccupancyNetwork(cfg).prior()
-        seen = window_errors(rooms, typed(cfg.renderer.camera), estimates, prior)
-        results.write_csv(seen, folder / SEEN)
+        errors = local_patch_errors(scenes, typed(cfg.renderer.camera), estimates, prior)
+        results.write_csv(errors, folder / SEEN)
     if "visual_embedding" in stages and "top" in cfg.mapper:
-        features = [own.visual["visual_embedding"] for own in observations]
-        results.write_csv(_places(cfg, rooms, walks, features), folder / PLACES)
+        features = [one.visual["visual_embedding"] for one in observations]
+        results.write_csv(_places(cfg, scenes, walks, features), folder / PLACES)
 
 
 def show(folder: Path) -> None:
@@ -73,21 +76,26 @@ def show(folder: Path) -> None:
             console.print()
 
 
-def _heard(cfg: DictConfig, rooms: Sequence[Scene], heard: Sequence[Tensor]) -> pd.DataFrame:
+def _source_estimates(
+    cfg: DictConfig, scenes: Sequence[Scene], estimates: Sequence[Tensor]
+) -> pd.DataFrame:
     names = tuple(sound_files(cfg))
-    errors = [sound_errors(room, own, names) for room, own in zip(rooms, heard, strict=True)]
+    errors = [
+        source_estimate_errors(scene, clips, names)
+        for scene, clips in zip(scenes, estimates, strict=True)
+    ]
     return pd.concat(errors, ignore_index=True).assign(acoustics=cfg.acoustics.name)
 
 
 def _places(
     cfg: DictConfig,
-    rooms: Sequence[Scene],
+    scenes: Sequence[Scene],
     walks: Sequence[NDArray[np.int64]],
     features: Sequence[Tensor],
 ) -> pd.DataFrame:
-    found = []
-    for room, own, seen in zip(rooms, walks, features, strict=True):
-        lattice = torch.from_numpy(room.grid.lattice).long()
-        found.append(place_errors(lattice, seen, torch.from_numpy(own), cfg.mapper.top))
-        found[-1].insert(0, "scene", room.name)
-    return pd.concat(found, ignore_index=True)
+    tables = []
+    for scene, states, embeddings in zip(scenes, walks, features, strict=True):
+        lattice = torch.from_numpy(scene.grid.lattice).long()
+        tables.append(place_errors(lattice, embeddings, torch.from_numpy(states), cfg.mapper.top))
+        tables[-1].insert(0, "scene", scene.name)
+    return pd.concat(tables, ignore_index=True)

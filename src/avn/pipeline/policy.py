@@ -1,4 +1,4 @@
-"""Actor-critic agents: their networks, trained where agents act, as a stage."""
+"""Stage of actor-critic agents: their networks, trained by reinforcement learning."""
 
 from __future__ import annotations
 
@@ -21,18 +21,21 @@ from avn.core.settings import plain
 from avn.dataset.scene import Scene
 from avn.mapping.ego_map import EgoMap
 from avn.navigation.episodes import frozen_episodes
-from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
-from avn.navigation.scene_batch import SceneBatch, build_scene_batch
-from avn.pipeline.apartments import TRAINING, Apartments
-from avn.pipeline.audio_inference import Clips
-from avn.pipeline.observations import Observed
-from avn.pipeline.occupancy import sees_windows
-from avn.pipeline.scenes import Geometry
-from avn.pipeline.sound_network import hears
+from avn.navigation.scene_batch import SceneBatch
+from avn.pipeline.apartments import TRAINING
+from avn.pipeline.occupancy import has_occupancy_model
+from avn.pipeline.policy_data import (
+    SUBSETS,
+    load_subset,
+    observed,
+    parts,
+    subset_stages,
+    tables_of,
+)
+from avn.pipeline.sound_network import has_sound_model
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import Stage
 from avn.pipeline.trained import METRICS, Trained
 from avn.rl.algorithm import Algorithm
 from avn.rl.exploration_memory import draw_walks
@@ -40,40 +43,34 @@ from avn.rl.networks import ActorCritic, NetworkSpec
 from avn.rl.training import BEST, MONITOR, Training, load_network
 from avn.rl.worker import TrainingSpec
 
-# Draws the episodes on which an agent is measured while it learns.
+# Seed of the episodes on which an agent is evaluated during training.
 MEASURED_SEED = 0
-PARTS = ("train", "validation")
-# Numbers from which the mean and spread of a feature are taken.
+# Maximum number of rows from which mean and standard deviation of a feature are estimated.
 _EXAMPLES = 200_000
 
 
 def learns(cfg: DictConfig) -> bool:
-    """Whether the config's agent is an actor-critic."""
+    """Return whether the config's agent is an actor-critic."""
     target = cfg.baseline._target_
     return bool(target) and issubclass(import_class("baseline._target_", target), ActorCriticAgent)
 
 
 def build_algorithm(cfg: DictConfig) -> Algorithm:
-    """The algorithm of a config; raises `UserError` where there is none, or it cannot work."""
+    """Build the algorithm of a config; raise `UserError` where there is none, or it cannot work."""
     if not cfg.algorithm._target_:
         raise UserError("algorithm: 'none' trains nothing; choose a3c")
     algorithm: Algorithm = build_object("algorithm", cfg.algorithm)
     return algorithm
 
 
-def parts(cfg: DictConfig) -> dict[str, Any]:
-    """What an actor-critic is built of beside its own node and its network."""
-    return {"hears": hears(cfg), "maps": sees_windows(cfg), "map_size": cfg.mapper.size}
-
-
 class Policy(Trained):
-    """The network of an actor-critic agent."""
+    """Stage of the network of an actor-critic agent."""
 
     kind = "train/policy"
 
     @property
     def name(self) -> str:
-        """The name of the row, which names the folder."""
+        """Name of the row, which names the folder."""
         return str(self.cfg.agent.name)
 
     def check(self) -> None:
@@ -88,23 +85,23 @@ class Policy(Trained):
             raise UserError(
                 "protocol.exploration_steps: 0, and an agent with memory explores; give 400"
             )
-        if sees_windows(self.cfg):
+        if has_occupancy_model(self.cfg):
             EgoMap(1, self.cfg.mapper.size, self.cfg.baseline.map_width)
 
     def needs(self) -> Sequence[Any]:
-        """What it observes in the training and in the validation apartments."""
-        return [stage for part in PARTS for stage in part_stages(self.cfg, part)]
+        """Return the stages of scenes and observations of training and validation apartments."""
+        return [stage for subset in SUBSETS for stage in subset_stages(self.cfg, subset)]
 
     def settings(self) -> Sequence[str]:
-        """Its shape, the recipe, and the rules of the episodes."""
-        maps = ("mapper.size",) if sees_windows(self.cfg) else ()
-        shaped = observed(self.cfg, "train").settings
-        # its name names the folder, so that two rows never share one
-        return ("agent.name", "baseline", "algorithm", "protocol", *maps, *shaped)
+        """Return the keys of the network's shape, the algorithm and the protocol."""
+        maps = ("mapper.size",) if has_occupancy_model(self.cfg) else ()
+        observation_keys = observed(self.cfg, "train").settings
+        # the name is part of the folder, so that two rows never share one
+        return ("agent.name", "baseline", "algorithm", "protocol", *maps, *observation_keys)
 
     def ignored(self) -> Sequence[str]:
-        """How it acts once it is trained, and what agents without memory or map have not."""
-        memory, maps = self.cfg.baseline.memory, sees_windows(self.cfg)
+        """Return keys of evaluation only, and keys of parts that the agent does not have."""
+        memory, maps = self.cfg.baseline.memory, has_occupancy_model(self.cfg)
         radius = self.cfg.protocol.goal != "radius"
         return [
             "baseline.samples",
@@ -119,27 +116,27 @@ class Policy(Trained):
             *(() if maps else ("baseline.map_width",)),
             *(() if memory and maps else ("baseline.top",)),
             *(("protocol.radius",) if radius else ()),
-            *(() if hears(self.cfg) else ("algorithm.realisations",)),
+            *(() if has_sound_model(self.cfg) else ("algorithm.realisations",)),
         ]
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         acoustics, seed = self.train.node("acoustics").name, self.cfg.algorithm.train_seed
         settings = f"{acoustics}, {self.cfg.protocol.name}, train_seed {seed}"
         return f"agent '{self.cfg.agent.name}' ({settings})"
 
     def seconds(self) -> float:
-        """By the number of actions and what is computed for each."""
-        microseconds = 30 + 30 * sees_windows(self.cfg) + 30 * bool(self.cfg.baseline.memory)
+        """Estimate the duration from the number of actions and the cost of each."""
+        microseconds = 30 + 30 * has_occupancy_model(self.cfg) + 30 * bool(self.cfg.baseline.memory)
         return float(self.cfg.algorithm.total_steps * microseconds / 1e6 * 1.6)
 
     def make(self) -> None:
-        """Train it, or go on where a killed training was."""
+        """Train the network, or resume an interrupted training."""
         _train(self)
 
     def load(self) -> ActorCritic:
-        """The trained network, set to evaluation.
+        """Return the trained network, set to evaluation.
 
         Raises
         ------
@@ -160,35 +157,6 @@ class Policy(Trained):
         return {str(name): int(size) for name, size in sizes.items()}
 
 
-def observed(cfg: DictConfig, part: str) -> Observed:
-    """What an actor-critic observes in a part of the training world."""
-    given = parts(cfg)
-    names = ActorCriticAgent(hears=given["hears"], maps=given["maps"]).wants(
-        build_object("protocol", cfg.protocol)
-    )
-    clips = Clips("algorithm.realisations", "train") if part == "train" else Clips()
-    return Observed(Apartments(cfg, part, TRAINING), names, clips)
-
-
-def part_stages(cfg: DictConfig, part: str) -> list[Stage]:
-    """Geometry of a part of the training world, and what makes the observations there."""
-    geometry = Geometry(cfg, Apartments(cfg, part, TRAINING))
-    return [geometry, *observed(cfg, part).stages.values()]
-
-
-def load_part(cfg: DictConfig, part: str) -> tuple[list[Scene], list[SceneObservations]]:
-    """Scenes of a part of the training world, with what is observed in each."""
-    scenes = Geometry(cfg, Apartments(cfg, part, TRAINING)).load()
-    return scenes, observed(cfg, part).load(scenes)
-
-
-def tables_of(cfg: DictConfig, opened: tuple[list[Scene], list[SceneObservations]]) -> SceneBatch:
-    """The apartments of `load_part` as tables, under the protocol of the config."""
-    rooms, observations = opened
-    sounds = len(sound_files(cfg, TRAINING))
-    return build_scene_batch(rooms, build_object("protocol", cfg.protocol), observations, sounds)
-
-
 def _shape(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
     protocol: Protocol = build_object("protocol", cfg.protocol)
     return NetworkSpec(
@@ -196,16 +164,16 @@ def _shape(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
         actions=protocol.actions,
         width=cfg.baseline.width,
         memory=cfg.baseline.memory,
-        map_channels=sees_windows(cfg) * (2 if cfg.baseline.memory else 1),
+        map_channels=has_occupancy_model(cfg) * (2 if cfg.baseline.memory else 1),
         map_width=cfg.baseline.map_width,
     )
 
 
 def _train(policy: Policy) -> None:
-    """Train, and write what was measured."""
+    """Train a policy and write its metrics."""
     started = time.perf_counter()
     cfg, recipe = policy.cfg, build_algorithm(policy.cfg)
-    opened = {part: load_part(cfg, part) for part in PARTS}
+    opened = {subset: load_subset(cfg, subset) for subset in SUBSETS}
     tables = tables_of(cfg, opened["train"])
     features = _sizes(tables)
     shape = _shape(cfg, features)
@@ -228,7 +196,7 @@ def _train(policy: Policy) -> None:
     )
     measure = Measure(cfg, opened, protocol)
     curve = Training(spec, network, policy.folder, measure, policy.fingerprint).run()
-    best = max(curve, key=lambda own: own[MONITOR])
+    best = max(curve, key=lambda point: point[MONITOR])
     metrics: dict[str, Any] = {f"best/{name}": value for name, value in best.items()}
     metrics |= {f"untrained/{name}": value for name, value in curve[0].items()}
     metrics |= {"features": features, "steps": curve[-1]["steps"]}
@@ -239,7 +207,7 @@ def _train(policy: Policy) -> None:
 
 
 def _sizes(tables: SceneBatch) -> dict[str, int]:
-    """Sizes of what a network takes as features, by name."""
+    """Return the sizes of a network's input features, by name."""
     both = {**tables.visual, **tables.audio}
     return {
         name: int(both[name].shape[-1])
@@ -248,24 +216,34 @@ def _sizes(tables: SceneBatch) -> dict[str, int]:
     }
 
 
-def _walks(cfg: DictConfig, rooms: Sequence[Scene], tables: SceneBatch) -> Tensor | None:
+def _walks(cfg: DictConfig, scenes: Sequence[Scene], tables: SceneBatch) -> Tensor | None:
     if not cfg.baseline.memory:
         return None
     steps = cfg.protocol.exploration_steps
     return draw_walks(
-        [*rooms], tables, cfg.algorithm.exploration_walks, steps, cfg.algorithm.train_seed
+        [*scenes], tables, cfg.algorithm.exploration_walks, steps, cfg.algorithm.train_seed
     )
 
 
-def _returns(walked: pd.DataFrame, reward: RewardConfig) -> pd.Series:
-    """What each episode would have earned in training, not discounted."""
-    success, collisions = walked["success"], walked["collisions"]
-    others = walked["actions"] - success - collisions
+def _returns(records: pd.DataFrame, reward: RewardConfig) -> pd.Series:
+    """Return each episode's undiscounted return under the training reward."""
+    success, collisions = records["success"], records["collisions"]
+    others = records["actions"] - success - collisions
     return success * reward.success + collisions * reward.collision + others * reward.step
 
 
 class Measure:
-    """How a network does on training and validation apartments, under the protocol."""
+    """Evaluation of a network on training and validation apartments, under the protocol.
+
+    Parameters
+    ----------
+    cfg : DictConfig
+        Config of a command.
+    observed : dict of str to tuple
+        Scenes and their observations by subset, as `load_subset` gives them.
+    protocol : Protocol
+        Protocol of the episodes.
+    """
 
     def __init__(self, cfg: DictConfig, observed: dict[str, Any], protocol: Protocol) -> None:
         self._cfg, self._observed = cfg, observed
@@ -274,23 +252,26 @@ class Measure:
         self._labels = Labels(agent=cfg.agent.name, acoustics=acoustics)
 
     def __call__(self, network: ActorCritic) -> dict[str, float]:
-        """Return, success rate and SPL, such as `validation/spl`."""
-        found = {}
+        """Evaluate a network: mean return, success rate and SPL, such as `validation/spl`."""
+        metrics = {}
         given, options = parts(self._cfg), plain(self._cfg, "baseline")
         options.pop("_target_")
-        options["samples"] = True  # how it acts once it is trained chooses no network
+        options["samples"] = True  # the best network does not depend on how it acts later
         agent = ActorCriticAgent(network, **options, **given)
-        for part, (rooms, observations) in self._observed.items():
-            name = "training" if part == "train" else part
-            walked = pd.concat(
-                rollout_scene(agent, room, self._episodes(room), self._protocol, self._labels, own)
-                for room, own in zip(rooms, observations, strict=True)
+        for subset, (scenes, observations) in self._observed.items():
+            # `train/` names the metrics of the training steps
+            name = "training" if subset == "train" else subset
+            records = pd.concat(
+                rollout_scene(
+                    agent, scene, self._episodes(scene), self._protocol, self._labels, observed
+                )
+                for scene, observed in zip(scenes, observations, strict=True)
             )
-            found[f"{name}/return"] = float(_returns(walked, self._cfg.algorithm.reward).mean())
-            found[f"{name}/success"] = float(walked["success"].mean())
-            found[f"{name}/spl"] = float(walked["spl"].mean())
-        return found
+            metrics[f"{name}/return"] = float(_returns(records, self._cfg.algorithm.reward).mean())
+            metrics[f"{name}/success"] = float(records["success"].mean())
+            metrics[f"{name}/spl"] = float(records["spl"].mean())
+        return metrics
 
-    def _episodes(self, room: Scene) -> Any:
+    def _episodes(self, scene: Scene) -> Any:
         sounds = list(sound_files(self._cfg, TRAINING))
-        return frozen_episodes(room, sounds, self._protocol, MEASURED_SEED)
+        return frozen_episodes(scene, sounds, self._protocol, MEASURED_SEED)

@@ -1,7 +1,7 @@
-"""Finished runs, walked again from their own config, so that pictures show what happened in them.
+"""Replay of finished runs from their config, to obtain the traces of episodes.
 
-Runs are deterministic: a run that cannot be walked again to the very same records was made by
-other code, and is refused.
+Runs are deterministic: a run whose replay gives other records was made by other code, and is
+refused.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from avn.core.errors import UserError
 from avn.core.settings import plain
 from avn.dataset.scene import Scene
 from avn.navigation.trace import Trace
-from avn.pipeline.run import Evaluation, read_run, walk_rooms
+from avn.pipeline.run import Evaluation, read_run, rollout_scenes
 from avn.pipeline.stage import MACHINE, build
 
-# Settings that a run is named by where it differs in them from the others.
+# Settings that name a run where it differs in them from the others.
 _TELLING = ("protocol", "acoustics", "look", "localisation", "exploration", "seed", "train_seed")
 _OTHER = "the run is of another version of avn or of its networks: run avn.eval again"
 SHOWS = ("typical", "success", "failure")
@@ -31,12 +31,14 @@ SHOWS = ("typical", "success", "failure")
 
 @dataclass
 class Run:
-    """A finished run.
+    """Finished run.
 
     Attributes
     ----------
     folder : Path
+        Folder of the run.
     cfg : DictConfig
+        Config of the run.
     results, episodes : DataFrame
         `results.csv` and `episodes.csv`.
     """
@@ -45,22 +47,22 @@ class Run:
     cfg: DictConfig
     results: pd.DataFrame
     episodes: pd.DataFrame
-    _rooms: list[Scene] = field(default_factory=list)
+    _scenes: list[Scene] = field(default_factory=list)
 
     @property
     def settings(self) -> dict[str, str]:
-        """The settings that the run reads, as dotted keys and texts."""
+        """Settings that the run reads, as dotted keys and texts."""
         read = sorted(Evaluation(self.cfg).read())
         return {key: str(plain(self.cfg, key)) for key in read}
 
     @property
-    def rooms(self) -> list[Scene]:
-        """The scenes that were walked."""
-        if not self._rooms:
+    def scenes(self) -> list[Scene]:
+        """Scenes of the run."""
+        if not self._scenes:
             geometry = Evaluation(self.cfg).geometry
             build(geometry)
-            self._rooms = geometry.load()
-        return self._rooms
+            self._scenes = geometry.load()
+        return self._scenes
 
 
 def open_run(folder: Path, cfg: DictConfig) -> Run:
@@ -82,88 +84,97 @@ def open_run(folder: Path, cfg: DictConfig) -> Run:
 
 
 def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
-    """Rows of `episodes.csv` that are worth showing.
+    """Select representative episodes.
 
     Parameters
     ----------
     episodes : DataFrame
         Records of one run, or some of them.
     show : {"typical", "success", "failure"}
-        Those nearest to the median SPL; those that succeeded by their SPL nearest to the median
-        of these; those that failed, by how far from the source they ended.
+        All episodes, successes or failures, ranked by their distance to the median of the group:
+        of the SPL, for failures of the final distance to the goal.
     count : int
-        At most so many, as far apart in sounds and rooms as there are.
+        Maximum number of episodes; they are spread over scenes and sounds.
 
     Returns
     -------
     list of int
-        Index labels of `episodes`, the fittest first.
+        Index labels of `episodes`, the best ranked first.
     """
     if show not in SHOWS:
         raise UserError(f"--show: '{show}' is none of {', '.join(SHOWS)}")
-    chosen = episodes
+    group = episodes
     if show != "typical":
-        chosen = episodes[episodes["success"] == (show == "success")]
-    if not len(chosen) or count < 1:
+        group = episodes[episodes["success"] == (show == "success")]
+    if not len(group) or count < 1:
         return []
-    figure = "dtg" if show == "failure" else "spl"
-    off = (chosen[figure] - chosen[figure].median()).abs()
-    # of equals the one whose source is as far away as usual, for it is neither easy nor odd
-    far = (chosen["geodesic"] - episodes["geodesic"].median()).abs()
-    ranked = chosen.assign(off=off, far=far).sort_values(["off", "far"], kind="stable")
+    metric = "dtg" if show == "failure" else "spl"
+    off = (group[metric] - group[metric].median()).abs()
+    # ties: the episode with a typical distance to the source
+    far = (group["geodesic"] - episodes["geodesic"].median()).abs()
+    ranked = group.assign(off=off, far=far).sort_values(["off", "far"], kind="stable")
     ranked["round"] = ranked.groupby(["scene", "sound"]).cumcount()
-    ranked["room_round"] = ranked.groupby(["round", "scene"]).cumcount()
-    ranked = ranked.sort_values(["round", "room_round", "off", "far"], kind="stable")
+    ranked["scene_round"] = ranked.groupby(["round", "scene"]).cumcount()
+    ranked = ranked.sort_values(["round", "scene_round", "off", "far"], kind="stable")
     return [int(label) for label in ranked.index[:count]]
 
 
 def same_episodes(run: Run, labels: Sequence[int], other: Run) -> list[int]:
-    """Rows of another run's `episodes.csv` with the same episodes.
+    """Return the rows of another run's `episodes.csv` with the same episodes.
+
+    Parameters
+    ----------
+    run : Run
+        Run of the given rows.
+    labels : sequence of int
+        Rows of its `episodes.csv`.
+    other : Run
+        Run to search.
 
     Raises
     ------
     UserError
-        Where the other run did not walk them.
+        Where the other run lacks one of the episodes.
     """
-    where = dict(zip(episode_keys(other.episodes), other.episodes.index, strict=True))
+    label_of = dict(zip(episode_keys(other.episodes), other.episodes.index, strict=True))
     wanted = episode_keys(run.episodes.loc[list(labels)])
-    if not set(wanted) <= set(where):
+    if not set(wanted) <= set(label_of):
         raise UserError(
-            f"{other.folder}: walked other episodes than {run.folder}; give runs with the same "
+            f"{other.folder}: has other episodes than {run.folder}; give runs with the same "
             "split, protocol, sound and seed"
         )
-    return [int(where[row]) for row in wanted]
+    return [int(label_of[key]) for key in wanted]
 
 
 def episode_keys(episodes: pd.DataFrame) -> list[tuple[Any, ...]]:
-    """What tells which episode a record is of, whoever walked it."""
+    """Return the identity of each record's episode, independent of the agent."""
     keys = ["scene", "sound", "seed", "episode", "source_cell", "start_cell", "start_heading"]
     return [tuple(row) for row in episodes[keys].itertuples(index=False)]
 
 
 def names_of(runs: Sequence[Run]) -> list[str]:
-    """Names that tell runs apart: the agent, and those settings in which they differ."""
+    """Return distinct names of runs: the agent and the settings in which they differ."""
     settings = [run.settings for run in runs]
-    keys = [key for own in settings for key in own]
+    keys = [key for read in settings for key in read]
     keys = [key for key in dict.fromkeys(keys) if len(_values(key, settings)) > 1]
     shown = {key: label for key in keys if (label := _label(key))}
     names = []
-    for run, own in zip(runs, settings, strict=True):
-        parts = dict.fromkeys(f"{shown[key]}={own[key]}" for key in shown if key in own)
+    for run, read in zip(runs, settings, strict=True):
+        parts = dict.fromkeys(f"{shown[key]}={read[key]}" for key in shown if key in read)
         names.append(", ".join((str(run.cfg.agent.name), *parts)))
-    if len(set(names)) < len(names):  # settings of networks or of rooms
+    if len(set(names)) < len(names):  # they differ in settings of networks or scenes
         names = [f"{name} ({run.folder.name})" for name, run in zip(names, runs, strict=True)]
     return names
 
 
 def settings_but_seed(run: Run) -> str:
-    """All settings of a run that make its records, but for the seed of its episodes."""
+    """Return all settings of a run that change its records, without the seed of its episodes."""
     others = ("seed", *MACHINE, "film", "film_show")
     return repr([(key, value) for key, value in run.settings.items() if key not in others])
 
 
 def _label(key: str) -> str:
-    """What a setting is called in a name; empty where it is not told."""
+    """Return the label of a setting in a run's name; empty where it is not shown."""
     first, last = key.split(".")[0], key.rsplit(".", 1)[-1]
     if first in _TELLING:
         return key.removesuffix(".name")
@@ -172,105 +183,107 @@ def _label(key: str) -> str:
 
 
 def _values(key: str, settings: Sequence[Mapping[str, str]]) -> set[str]:
-    """What runs that read a setting have for it."""
-    return {own[key] for own in settings if key in own}
+    """Return the values of a setting among the runs that read it."""
+    return {read[key] for read in settings if key in read}
 
 
 def traces(run: Run, labels: Sequence[int], beliefs: bool = True) -> list[Trace]:
-    """Walk a run again, in the rooms of some episodes, and keep their traces.
+    """Replay a run in the scenes of some episodes and return their traces.
 
     Parameters
     ----------
     run : Run
+        Finished run.
     labels : sequence of int
         Rows of `episodes.csv`.
     beliefs : bool
-        Whether what an agent with a map took to be true is kept too.
+        Whether traces include the beliefs of an agent with a map.
 
     Raises
     ------
     UserError
-        Where the walk is another than the one that the run recorded.
+        Where the replay differs from the records.
     """
-    (found,) = walk_again(run, [(labels, beliefs)])
-    return found
+    (selection,) = rollout_again(run, [(labels, beliefs)])
+    return selection
 
 
-def walk_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[list[Trace]]:
-    """As `traces`, of several choices in one walk."""
-    explicit = list(wanted)
-    names = set(run.episodes.loc[[label for labels, _ in explicit for label in labels], "scene"])
-    kept = [index for index, room in enumerate(run.rooms) if room.name in names]
-    # in a batch the episodes of a room stand in the order of its records
+def rollout_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> list[list[Trace]]:
+    """Replay a run once for several selections of episodes; see `traces`."""
+    selections = list(wanted)
+    names = set(run.episodes.loc[[label for labels, _ in selections for label in labels], "scene"])
+    kept = [index for index, scene in enumerate(run.scenes) if scene.name in names]
+    # the batch of a scene has the episodes in the order of its records
     rows = run.episodes.groupby("scene").cumcount()
     recorders = [
-        Recorder(_by_room(run, rows, labels), run.cfg.realisations, beliefs)
-        for labels, beliefs in explicit
+        Recorder(_by_scene(run, rows, labels), run.cfg.realisations, beliefs)
+        for labels, beliefs in selections
     ]
 
     def watch(*step: Any) -> bool:
         enough = [recorder(*step) for recorder in recorders]  # each of them sees every step
         return all(enough)
 
-    # a run of another version must not set off the training of this version's networks
+    # a run of another version must not start the training of this version's networks
     cfg = run.cfg.copy()
-    own = run.folder.resolve().name.endswith(Evaluation(cfg).fingerprint[:8])
-    cfg.auto = cfg.auto and own
+    same_version = run.folder.resolve().name.endswith(Evaluation(cfg).fingerprint[:8])
+    cfg.auto = cfg.auto and same_version
     try:
-        walked = _walk(cfg, run.rooms, kept, watch)
+        records = _rollout(cfg, run.scenes, kept, watch)
     except UserError as error:
-        if own:
+        if same_version:
             raise
         raise UserError(f"{run.folder}: {_OTHER} ({error})") from error
     _check_same(
-        run, pd.concat(walked, ignore_index=True), [own for part, _ in explicit for own in part]
+        run,
+        pd.concat(records, ignore_index=True),
+        [label for labels, _ in selections for label in labels],
     )
     return [
         [
             recorder.trace(str(row["scene"]), int(rows[label]), row)
             for label, row in zip(labels, _records(run, labels), strict=True)
         ]
-        for recorder, (labels, _) in zip(recorders, explicit, strict=True)
+        for recorder, (labels, _) in zip(recorders, selections, strict=True)
     ]
 
 
-def _walk(
-    cfg: DictConfig, rooms: Sequence[Scene], kept: Sequence[int], watch: Watch
+def _rollout(
+    cfg: DictConfig, scenes: Sequence[Scene], kept: Sequence[int], watch: Watch
 ) -> list[pd.DataFrame]:
-    """Walk some of the rooms of a config, by number."""
+    """Run the episodes of some scenes, given by index."""
     evaluation = Evaluation(cfg)
     for need in evaluation.needs():
         build(need)
-    observations = evaluation.observed.load(rooms)
-    return walk_rooms(
+    observations = evaluation.observed.load(scenes)
+    return rollout_scenes(
         cfg,
-        [rooms[i] for i in kept],
+        [scenes[i] for i in kept],
         [observations[i] for i in kept],
         watch,
     )
 
 
-def _by_room(run: Run, rows: pd.Series, labels: Sequence[int]) -> dict[str, list[int]]:
-    own = run.episodes.loc[list(labels), "scene"]
-    return {str(room): rows.loc[part.index].tolist() for room, part in own.groupby(own)}
+def _by_scene(run: Run, rows: pd.Series, labels: Sequence[int]) -> dict[str, list[int]]:
+    names = run.episodes.loc[list(labels), "scene"]
+    return {str(scene): rows.loc[group.index].tolist() for scene, group in names.groupby(names)}
 
 
 def _records(run: Run, labels: Sequence[int]) -> list[Mapping[str, Any]]:
-    found = run.episodes.loc[list(labels)].to_dict("records")
-    return [{**row, "row": int(label)} for label, row in zip(labels, found, strict=True)]  # type: ignore[dict-item]
+    records = run.episodes.loc[list(labels)].to_dict("records")
+    return [{**row, "row": int(label)} for label, row in zip(labels, records, strict=True)]  # type: ignore[dict-item]
 
 
-def _check_same(run: Run, walked: pd.DataFrame, labels: Sequence[int]) -> None:
-    """Raise `UserError` unless the episodes of `labels` went as the run's records say."""
+def _check_same(run: Run, replayed: pd.DataFrame, labels: Sequence[int]) -> None:
+    """Raise `UserError` unless the replayed episodes of `labels` equal the run's records."""
     keys = ["scene", "sound", "episode"]
-    own = run.episodes.loc[sorted(set(labels))]
-    again = own[keys].merge(walked, on=keys, how="left")[list(own.columns)]
+    recorded = run.episodes.loc[sorted(set(labels))]
+    again = recorded[keys].merge(replayed, on=keys, how="left")[list(recorded.columns)]
     try:
         pd.testing.assert_frame_equal(
-            again, own.reset_index(drop=True), check_dtype=False, rtol=1e-9
+            again, recorded.reset_index(drop=True), check_dtype=False, rtol=1e-9
         )
     except AssertionError as error:
         raise UserError(
-            f"{run.folder}: walked again, its episodes end otherwise than episodes.csv says: "
-            + _OTHER
+            f"{run.folder}: the replayed episodes differ from episodes.csv: " + _OTHER
         ) from error

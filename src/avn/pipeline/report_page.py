@@ -1,4 +1,4 @@
-"""The page of some runs: one HTML file that holds all that it shows."""
+"""Report of runs: a self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from avn.core.hashing import digest
 from avn.core.progress import log
 from avn.navigation.trace import Trace
 from avn.pipeline import replay
-from avn.pipeline.observed import Perceived, soundtrack
+from avn.pipeline.observed import RunObservations, soundtrack
 from avn.pipeline.replay import Run
 from avn.reporting import page, page_media
 from avn.reporting.results import across_seeds, summarise
@@ -24,14 +24,14 @@ from avn.reporting.results import across_seeds, summarise
 def write_page(
     runs: Sequence[Run], count: int, show: str, paths: bool, output: Path | None
 ) -> Path:
-    """Write the page of some runs; gives the file.
+    """Write the report of some runs and return its path.
 
     Parameters
     ----------
     runs, count, show, paths
-        As of `build`.
+        As those of `build`.
     output : Path, optional
-        The file; by default one under the first run's `outputs/report`.
+        Path of the file; by default under the first run's `outputs/report`.
 
     Raises
     ------
@@ -61,18 +61,20 @@ def write_page(
 
 
 def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> str:
-    """The page of some runs as HTML.
+    """Return the report of some runs as HTML.
 
     Parameters
     ----------
     runs : sequence of Run
+        Finished runs.
     count : int
-        Episodes of each room and sound that are embedded with views and sound.
+        Number of episodes of each scene and sound that are embedded with views and sound.
     show : str
-        Which, one or more of typical, success and failure with commas; as
-        `avn.pipeline.replay.choose`, of the first run, and the same ones of the others.
+        One or more of typical, success and failure, separated by commas; see
+        `avn.pipeline.replay.choose`. The selection is of the first run; other runs show the same
+        episodes where they have them.
     paths : bool
-        Whether the ways of all other episodes are embedded too.
+        Whether the paths of all other episodes are embedded too.
     """
     names = replay.names_of(runs)
     groups = _seed_groups(runs)
@@ -81,8 +83,8 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
     pages = []
     for index, (run, labels) in enumerate(zip(runs, _chosen(runs, count, show), strict=True)):
         if labels or paths:
-            log(f"{run.folder}: walking {'all' if paths else len(labels)} episodes again")
-        # the runs of several seeds taken together stand first
+            log(f"{run.folder}: replaying {'all' if paths else len(labels)} episodes")
+        # groups of runs over several seeds come first
         embedded, walked_paths = media.add(run, len(groups) + index, labels, paths)
         pages.append(
             page.PageRun(
@@ -97,7 +99,7 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
                 within=index in within,
             )
         )
-    together = [_together([runs[i] for i in own], [pages[i] for i in own]) for own in groups]
+    together = [_together([runs[i] for i in group], [pages[i] for i in group]) for group in groups]
     agents = " · ".join(dict.fromkeys(str(run.cfg.agent.name) for run in runs))
     return page.render(
         f"Runs of {agents}",
@@ -109,47 +111,47 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
 
 
 def _seed_groups(runs: Sequence[Run]) -> list[list[int]]:
-    """Numbers of the runs that differ in their seed alone, where there are two or more."""
+    """Return groups of indices of runs that differ in their seed only, of two runs or more."""
     groups: dict[str, list[int]] = {}
     for index, run in enumerate(runs):
         groups.setdefault(replay.settings_but_seed(run), []).append(index)
-    return [own for own in groups.values() if len(own) > 1]
+    return [group for group in groups.values() if len(group) > 1]
 
 
 def _together(runs: Sequence[Run], pages: Sequence[page.PageRun]) -> page.PageRun:
-    """Runs that differ in their seed alone as one."""
+    """Merge the pages of runs that differ in their seed only."""
     seeds = ", ".join(str(run.cfg.seed) for run in runs)
-    episodes = pd.concat([own.episodes for own in pages], ignore_index=True)
-    starts = np.cumsum([0, *(len(own.episodes) for own in pages)]).tolist()
+    episodes = pd.concat([one.episodes for one in pages], ignore_index=True)
+    starts = np.cumsum([0, *(len(one.episodes) for one in pages)]).tolist()
     media = {
         start + label: number
-        for start, own in zip(starts, pages, strict=False)
-        for label, number in own.media.items()
+        for start, one in zip(starts, pages, strict=False)
+        for label, number in one.media.items()
     }
     return page.PageRun(
         name=f"{runs[0].cfg.agent.name}, seeds {seeds}",
-        folder=", ".join(own.folder for own in pages),
+        folder=", ".join(one.folder for one in pages),
         settings=pages[0].settings,
         privileged=pages[0].privileged,
-        # with one seed for all, so that the intervals are over all episodes of a source
+        # one seed for all, so that the intervals are over all episodes of a source
         results=summarise(episodes.assign(seed=0)),
         episodes=episodes,
         media=media,
-        paths=[path for own in pages for path in own.paths or []] or None,
-        seeds=across_seeds(pd.concat([own.results for own in pages])),
+        paths=[path for one in pages for path in one.paths or []] or None,
+        seeds=across_seeds(pd.concat([one.results for one in pages])),
     )
 
 
 def _chosen(runs: Sequence[Run], count: int, show: str) -> Iterator[list[int]]:
-    """Rows of each run to embed: of each room and sound the same episodes where runs share them."""
+    """Yield the rows of each run to embed; runs share episodes where they have the same ones."""
     chosen: set[tuple[Any, ...]] = set()
     for run in runs:
         keys = dict(zip(run.episodes.index, replay.episode_keys(run.episodes), strict=True))
         labels: list[int] = []
-        for _, part in run.episodes.groupby(["scene", "sound"], sort=False):
-            shared = [int(label) for label in part.index if keys[label] in chosen]
-            each = [replay.choose(part, word, count) for word in show.split(",")]
-            labels += shared or list(dict.fromkeys(label for own in each for label in own))
+        for _, group in run.episodes.groupby(["scene", "sound"], sort=False):
+            shared = [int(label) for label in group.index if keys[label] in chosen]
+            picks = [replay.choose(group, word, count) for word in show.split(",")]
+            labels += shared or list(dict.fromkeys(label for pick in picks for label in pick))
         chosen |= {keys[label] for label in labels}
         yield labels
 
@@ -165,7 +167,7 @@ def _settings(run: Run) -> str:
 
 
 class _Media:
-    """Plans, views and episodes that are embedded, each once."""
+    """Plans, views and episodes of the report, each embedded once."""
 
     def __init__(self) -> None:
         self.plans: list[dict[str, Any]] = []
@@ -178,30 +180,53 @@ class _Media:
     def add(
         self, run: Run, index: int, labels: Sequence[int], paths: bool
     ) -> tuple[dict[int, int], list[dict[str, Any]] | None]:
-        """Embed episodes of a run; gives the number of each, and all ways if asked for."""
+        """Embed episodes of a run.
+
+        Parameters
+        ----------
+        run : Run
+            Finished run.
+        index : int
+            Number of the run on the page.
+        labels : sequence of int
+            Rows of `episodes.csv` to embed with views and sound.
+        paths : bool
+            Whether the paths of all episodes are wanted.
+
+        Returns
+        -------
+        numbers : dict of int to int
+            Number of each embedded episode by its row.
+        shown_paths : list of dict or None
+            Plan and states of all episodes, with `paths`.
+        """
         if not labels and not paths:
             return {}, None
-        every = run.episodes.index.tolist() if paths else []
-        traces, walked = replay.walk_again(run, [(labels, True), (every, False)])
-        found = [{"plan": self._plan(own), "states": own.state.tolist()} for own in walked]
-        return self._embed(run, index, labels, traces), found or None
+        others = run.episodes.index.tolist() if paths else []
+        traces, path_traces = replay.rollout_again(run, [(labels, True), (others, False)])
+        shown_paths = [
+            {"plan": self._plan(one), "states": one.state.tolist()} for one in path_traces
+        ]
+        return self._embed(run, index, labels, traces), shown_paths or None
 
     def _embed(
         self, run: Run, index: int, labels: Sequence[int], traces: Sequence[Trace]
     ) -> dict[int, int]:
-        perceived = Perceived(run) if labels else None
+        observations = RunObservations(run) if labels else None
         keys = replay.episode_keys(run.episodes.loc[list(labels)])
         numbers = {}
         for label, key, trace in zip(labels, keys, traces, strict=True):
-            assert perceived is not None
+            assert observations is not None
             place = self._key(trace)
-            clips = perceived.clips(trace)
-            own = page_media.episode_media(trace, soundtrack(clips), clips.shape[-1])
-            own |= {"run": index, "plan": self._plan(trace)}
-            renderer = (place, str(run.cfg.renderer.name))
-            own["views"] = [self._view(perceived, trace, *renderer, int(s)) for s in trace.state]
+            clips = observations.clips(trace)
+            episode = page_media.episode_media(trace, soundtrack(clips), clips.shape[-1])
+            episode |= {"run": index, "plan": self._plan(trace)}
+            shown = (place, str(run.cfg.renderer.name))
+            episode["views"] = [
+                self._view(observations, trace, *shown, int(s)) for s in trace.state
+            ]
             numbers[int(label)] = len(self._episodes)
-            self._episodes.append(own)
+            self._episodes.append(episode)
             self._keys.append((place, *key))
         return numbers
 
@@ -210,27 +235,29 @@ class _Media:
         return str(getattr(trace.place, "folder", trace.place.name))
 
     def _plan(self, trace: Trace) -> int:
-        """The number of an apartment's plan."""
+        """Return the number of an apartment's plan; embed the plan where it is new."""
         place = self._key(trace)
         if place not in self._plan_of:
             self._plan_of[place] = len(self.plans)
             self.plans.append(page_media.plan_of_place(trace.place))
         return self._plan_of[place]
 
-    def _view(self, perceived: Perceived, trace: Trace, place: str, name: str, state: int) -> int:
+    def _view(
+        self, observations: RunObservations, trace: Trace, place: str, name: str, state: int
+    ) -> int:
         key = (place, name, state)
         if key not in self._view_of:
             self._view_of[key] = len(self.views)
-            (view,) = perceived.views(trace.place.name, [state])
+            (view,) = observations.views(trace.place.name, [state])
             self.views.append(page_media.view_url(view))
         return self._view_of[key]
 
     def with_twins(self) -> list[dict[str, Any]]:
-        """The episodes, each with the numbers of those of all runs that are the same."""
+        """Return the episodes, each with the numbers of the same episode in all runs."""
         twins: dict[tuple[Any, ...], list[int]] = {}
         for number, key in enumerate(self._keys):
             twins.setdefault(key, []).append(number)
         return [
-            {**own, "twins": twins[key]}
-            for own, key in zip(self._episodes, self._keys, strict=True)
+            {**episode, "twins": twins[key]}
+            for episode, key in zip(self._episodes, self._keys, strict=True)
         ]

@@ -1,4 +1,4 @@
-"""A table of results: what it needs is made, each row walks with each seed, and all is written."""
+"""Results table: evaluation of each row with each seed, and the table's files."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from avn.core.progress import format_duration, log
 from avn.pipeline.dashboard import Dashboard
 from avn.pipeline.run import RESULTS, Evaluation, agent_label, read_run
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import make, missing, missing_error, spent
+from avn.pipeline.stage import make, missing, missing_error, timings
 from avn.reporting import published, results, table
 from avn.reporting.table import PAPER_PROTOCOL
 
-# What it leaves beside `results.csv`.
+# Files beside `results.csv`.
 ACROSS, CELLS, TABLE, LATEX, SECONDS = (
     "across_seeds.csv",
     "cells.csv",
@@ -32,19 +32,19 @@ ACROSS, CELLS, TABLE, LATEX, SECONDS = (
 
 
 def reproduce(cfg: DictConfig, rows: Sequence[DictConfig]) -> Path:
-    """Make what is missing, run each row with each seed, and print the whole table.
+    """Build what is missing, evaluate each row with each seed, and print the table.
 
     Parameters
     ----------
     cfg : DictConfig
-        Of `avn.reproduce`.
+        Config of `avn.reproduce`.
     rows : sequence of DictConfig
-        The config of each row, as of `avn.eval`.
+        Config of each row, as of `avn.eval`.
 
     Returns
     -------
     Path
-        The folder of the table.
+        Folder of the table.
 
     Raises
     ------
@@ -54,28 +54,28 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig]) -> Path:
     for key in ("rows", "seeds", "train_seeds"):
         if not cfg[key]:
             raise UserError(f"{key}: empty; give at least one, such as rows=greedy seeds=0")
-    configs = [own for composed in rows for own in _runs(cfg, composed)]
-    folders = _walk(configs)
+    configs = [config for row in rows for config in _runs(cfg, row)]
+    folders = _make_runs(configs)
     tables, episodes = zip(*map(read_run, folders), strict=True)
-    runs, walked = pd.concat(tables), pd.concat(episodes)
-    privileged = {agent_label(own) for own in configs if own.agent.privileged}
-    cells = published.published(runs, walked)
+    runs, records = pd.concat(tables), pd.concat(episodes)
+    privileged = {agent_label(config) for config in configs if config.agent.privileged}
+    cells = published.published(runs, records)
     for shown in (published.terminal(cells, privileged), table.hardness_table(episodes[0])):
         table.wide_console().print(shown)
     target = stage_folder(cfg.outputs, "reproduce", "table", digest([f.name for f in folders]))
     _write(target, runs, cells, list(sound_files(configs[0])), privileged)
-    _compare(walked)
+    _compare(records)
     return target
 
 
 def settings_of(rows: Sequence[DictConfig]) -> set[str]:
-    """Leaf keys of the config that at least one row reads, and those of the command itself."""
-    own = {"rows", "sounds", "seeds", "train_seeds"}
-    return own.union(*(Evaluation(row).read() for row in rows))
+    """Return the leaf keys of the config that a row or the command itself reads."""
+    keys = {"rows", "sounds", "seeds", "train_seeds"}
+    return keys.union(*(Evaluation(row).read() for row in rows))
 
 
-def _walk(configs: Sequence[DictConfig]) -> list[Path]:
-    """Make what is missing and let all runs walk; tell the plan before, and each row at its end."""
+def _make_runs(configs: Sequence[DictConfig]) -> list[Path]:
+    """Make all runs and what they need; print the plan first and each row when it is finished."""
     runs = [Evaluation(cfg) for cfg in configs]
     for run in runs:
         run.check()
@@ -99,53 +99,53 @@ def _walk(configs: Sequence[DictConfig]) -> list[Path]:
 
 
 class _Rows:
-    """The rows of the table, which are filled in their order as their runs come to an end."""
+    """Rows of the table, filled in order as their runs finish."""
 
     def __init__(self, runs: Sequence[Evaluation], board: Dashboard) -> None:
         self._left, self._board = list(runs), board
-        self._walked: dict[str, list[Path]] = {}
+        self._finished: dict[str, list[Path]] = {}
         self._started = time.monotonic()
 
     def fill(self) -> None:
-        """Take in the next runs, as far as they are there."""
+        """Add the next runs that are finished."""
         while self._left and self._left[0].done():
             run = self._left.pop(0)
             row = str(run.cfg.agent.name)
-            folders = self._walked.setdefault(row, [])
+            folders = self._finished.setdefault(row, [])
             folders.append(run.folder)
             self._board.fill(row, _average(folders))
-            if row not in [own.cfg.agent.name for own in self._left]:
+            if row not in [left.cfg.agent.name for left in self._left]:
                 passed = format_duration(time.monotonic() - self._started)
                 log(f"{row}: {_average(folders)} after {passed}")
 
 
 def _average(folders: Sequence[Path]) -> str:
-    """Success rate and SPL of some runs, over all sounds and rooms."""
+    """Return success rate and SPL of some runs in percent, over all sounds and scenes."""
     runs = pd.concat([read_run(folder)[0] for folder in folders])
     average = runs[runs["scene"] == results.AVERAGE]
-    every = average[average["sound"] == results.ALL_SOUNDS]
-    mean = 100.0 * (every if len(every) else average)[["sr", "spl"]].mean()
+    all_sounds = average[average["sound"] == results.ALL_SOUNDS]
+    mean = 100.0 * (all_sounds if len(all_sounds) else average)[["sr", "spl"]].mean()
     return f"{mean['sr']:.1f} / {mean['spl']:.1f}"
 
 
 def _runs(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:
-    """The configs of a row: each seed, and each network where something in it is trained."""
+    """Return the configs of a row: one per seed, and per train_seed where it has networks."""
     networks = list(dict.fromkeys(cfg.train_seeds))
     if "train_seed" not in Evaluation(composed).read():
         networks = [composed.train_seed]
     runs = []
     for seed in dict.fromkeys(cfg.seeds):
         for train_seed in networks:
-            own = copy.deepcopy(composed)  # composing takes Hydra a while
-            own.seed, own.train_seed = seed, train_seed
-            runs.append(own)
+            config = copy.deepcopy(composed)  # composing anew is slow
+            config.seed, config.train_seed = seed, train_seed
+            runs.append(config)
     return runs
 
 
 def _write(
     target: Path, runs: pd.DataFrame, cells: pd.DataFrame, sounds: list[str], privileged: set[str]
 ) -> None:
-    """Leave the table as CSV, Markdown and LaTeX, and where the time went."""
+    """Write the table as CSV, Markdown and LaTeX, and the durations of the stages."""
     results.write_csv(runs, target / RESULTS)
     results.write_csv(results.across_seeds(runs), target / ACROSS)
     results.write_csv(cells, target / CELLS)
@@ -155,8 +155,8 @@ def _write(
     ):
         with atomic_write(target / name) as part:
             part.write_text(text, encoding="utf-8")
-    seconds = pd.DataFrame({"stage": list(spent), "seconds": list(spent.values())})
-    if len(seconds):  # a table that was all there already says nothing new
+    seconds = pd.DataFrame({"stage": list(timings), "seconds": list(timings.values())})
+    if len(seconds):  # where nothing was made, the earlier durations stay
         seconds = seconds.sort_values("seconds", ascending=False).round(1)
         results.write_csv(seconds, target / SECONDS)
         for row in seconds.itertuples():
@@ -164,7 +164,7 @@ def _write(
 
 
 def _compare(episodes: pd.DataFrame) -> None:
-    """Print how much better each row is than the one before it, over the same episodes."""
+    """Print the difference in SPL of each row to the one before it, over the same episodes."""
     rows = list(dict.fromkeys(episodes["agent"]))
     metrics = [*results.METRICS.values()]
     keys = ["agent", "sound", "scene", "seed", "episode", "source", "start_cell", "start_heading"]

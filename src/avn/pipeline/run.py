@@ -1,4 +1,4 @@
-"""One run: an agent walks all episodes of the test apartments and leaves its records."""
+"""Stage of a run: evaluation of an agent over all episodes of the test apartments."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ EPISODES = ("frozen", "exhaustive")
 
 
 def wanted_by(cfg: DictConfig) -> tuple[str, ...]:
-    """The observations that the agent of a config cannot do without."""
+    """Return the observations that the agent of a config needs."""
     return build_agent(cfg).wants(build_object("protocol", cfg.protocol))
 
 
 def agent_label(cfg: DictConfig) -> str:
-    """The name of the config's agent in tables; it tells which parts of the truth it is given."""
+    """Return the name of the config's agent in tables, with its `oracle_inputs`."""
     return "-true-".join((cfg.agent.name, *cfg.agent.oracle_inputs))
 
 
 class Evaluation(Stage):
-    """A run: the records of an agent over all episodes of a part of the test world."""
+    """Stage of a run: records of an agent over all episodes of a subset of the test world."""
 
     kind = "eval"
     # Raised when the code of simulator, agents or metrics changes a record.
@@ -60,28 +60,28 @@ class Evaluation(Stage):
 
     @property
     def apartments(self) -> Apartments:
-        """The apartments in which it walks."""
+        """Apartments of the episodes."""
         return Apartments(self.cfg, self.cfg.subset)
 
     @property
     def geometry(self) -> Geometry:
-        """Their geometry."""
+        """Stage of the apartments' geometry."""
         return Geometry(self.cfg, self.apartments)
 
     @property
     def observed(self) -> Observed:
-        """What its agent observes there."""
+        """Observations of the agent."""
         return Observed(self.apartments, wanted_by(self.cfg), truth=self.cfg.agent.oracle_inputs)
 
     def needs(self) -> Sequence[Stage]:
-        """Geometry, what makes the observations, and the networks of the agent."""
+        """Return the stages of geometry, observations and the agent's networks."""
         stages = self.observed.stages
-        # its prior stands beside what it says of free cells
+        # for the prior in the table of local patches
         prior = [OccupancyNetwork(self.cfg)] if "local_patch" in stages else []
         return (self.geometry, *stages.values(), *agent_stages(self.cfg), *prior)
 
     def settings(self) -> Sequence[str]:
-        """The rules, the episodes, and the agent."""
+        """Return the keys of the protocol, the episodes and the agent."""
         explores = ("exploration",) if self._walks_first else ()
         return (
             "protocol",
@@ -89,14 +89,14 @@ class Evaluation(Stage):
             "seed",
             "episodes",
             *explores,
-            # a column of the records, also for agents that do not hear
+            # a column of the records, also for agents without a microphone
             "acoustics.name",
             *agent_settings(self.cfg),
             *self.observed.settings,
         )
 
     def ignored(self) -> Sequence[str]:
-        """What makes no difference to this agent under these rules."""
+        """Return the keys that do not change this agent's records under this protocol."""
         radius = () if self.cfg.protocol.goal == "radius" else ("protocol.radius",)
         frozen = self.cfg.episodes == "frozen"
         lists = () if frozen else ("protocol.num_starts", "protocol.exploration_steps")
@@ -107,16 +107,16 @@ class Evaluation(Stage):
         return self.cfg.episodes == "frozen" and self.cfg.protocol.exploration_steps > 0
 
     def consulted(self) -> Sequence[str]:
-        """The part, sounds by their recordings, and what is made of a finished run."""
+        """Return the keys of the subset, of the sounds and of films of a finished run."""
         return ("subset", "sound", "film", "film_show")
 
     def content(self) -> Any:
-        """The recordings."""
+        """Return the hashes of the recordings."""
         return sounds_content(self.cfg)
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         cfg = self.cfg
         return f"run of '{cfg.agent.name}' (seed {cfg.seed}, train_seed {cfg.train_seed})"
 
@@ -129,7 +129,7 @@ class Evaluation(Stage):
         return Path(self.cfg.outputs) / "eval" / self.cfg.agent.name / sounds / name
 
     def seconds(self) -> float:
-        """A few seconds, more where a map or a network is at work."""
+        """Estimate 3 s, or 15 s for an agent with a map or a network."""
         return 15.0 if self.cfg.planner._target_ or learns(self.cfg) else 3.0
 
     def check(self) -> None:
@@ -144,7 +144,7 @@ class Evaluation(Stage):
         ):
             if cfg[key] not in known:
                 raise UserError(f"{key}: '{cfg[key]}' is none of {', '.join(known)}")
-        build_object("protocol", cfg.protocol)  # rules that contradict themselves are refused first
+        build_object("protocol", cfg.protocol)  # refuses contradictory rules first
         agent = build_agent(cfg)
         if agent.privileged != cfg.agent.privileged:
             raise UserError(
@@ -163,17 +163,17 @@ class Evaluation(Stage):
         dry_sounds(cfg)  # a bad file is refused before anything is made
 
     def done(self) -> bool:
-        """Whether all its episodes have been walked."""
+        """Return whether the results have been written."""
         return (self.folder / RESULTS).is_file()
 
     def make(self) -> None:
-        """Walk, and write `episodes.csv`, `results.csv` and TensorBoard."""
-        cfg, folder, rooms = self.cfg, self.folder, self.geometry.load()
-        observations = self.observed.load(rooms)
-        episodes = pd.concat(walk_rooms(cfg, rooms, observations), ignore_index=True)
+        """Run the episodes and write `episodes.csv`, `results.csv` and TensorBoard events."""
+        cfg, folder, scenes = self.cfg, self.folder, self.geometry.load()
+        observations = self.observed.load(scenes)
+        episodes = pd.concat(rollout_scenes(cfg, scenes, observations), ignore_index=True)
         protocol: Protocol = build_object("protocol", cfg.protocol)
-        walks = [episodes_of(cfg, room, protocol).walks for room in rooms]
-        perception_tables.write(self.observed, rooms, walks, observations, folder)
+        walks = [episodes_of(cfg, scene, protocol).walks for scene in scenes]
+        perception_tables.write(self.observed, scenes, walks, observations, folder)
         summary = results.summarise(episodes)
         _log(cfg, folder, summary)
         with atomic_write(folder / "config.yaml") as part:
@@ -182,26 +182,29 @@ class Evaluation(Stage):
         results.write_csv(summary, folder / RESULTS)
 
 
-def walk_rooms(
+def rollout_scenes(
     cfg: DictConfig,
-    rooms: Sequence[Scene],
+    scenes: Sequence[Scene],
     observations: Sequence[SceneObservations],
     watch: Watch | None = None,
 ) -> list[pd.DataFrame]:
-    """Let the agent of a config walk all episodes of some rooms.
+    """Run the agent of a config in all episodes of some scenes.
 
     Parameters
     ----------
-    rooms : sequence of Scene
+    cfg : DictConfig
+        Config of `avn.eval`.
+    scenes : sequence of Scene
+        Scenes of the episodes.
     observations : sequence of SceneObservations
-        What is heard and seen in each.
+        Observations in each scene.
     watch : callable, optional
-        Looks on; see `avn.agents.rollout.Watch`.
+        Callback of every step; see `avn.agents.rollout.Watch`.
 
     Returns
     -------
     list of DataFrame
-        The records of each room.
+        Records of each scene.
     """
     protocol: Protocol = build_object("protocol", cfg.protocol)
     agent = build_agent(cfg, ready=True)
@@ -211,26 +214,38 @@ def walk_rooms(
         look=cfg.look if cfg.planner._target_ else "once",
     )
     return [
-        rollout_scene(agent, room, episodes_of(cfg, room, protocol), protocol, labels, own, watch)
-        for room, own in zip(rooms, observations, strict=True)
+        rollout_scene(
+            agent, scene, episodes_of(cfg, scene, protocol), protocol, labels, observed, watch
+        )
+        for scene, observed in zip(scenes, observations, strict=True)
     ]
 
 
-def episodes_of(cfg: DictConfig, room: Scene, protocol: Protocol) -> Episodes:
-    """The episodes of a room as the config asks for them."""
+def episodes_of(cfg: DictConfig, scene: Scene, protocol: Protocol) -> Episodes:
+    """Return the episodes of a scene.
+
+    Parameters
+    ----------
+    cfg : DictConfig
+        Config of `avn.eval`.
+    scene : Scene
+        Scene of the episodes.
+    protocol : Protocol
+        Protocol of the config.
+    """
     sounds = list(sound_files(cfg))
     if cfg.episodes == "exhaustive":
-        return exhaustive_episodes(room, sounds, protocol, cfg.seed)
-    return frozen_episodes(room, sounds, protocol, cfg.seed, cfg.exploration)
+        return exhaustive_episodes(scene, sounds, protocol, cfg.seed)
+    return frozen_episodes(scene, sounds, protocol, cfg.seed, cfg.exploration)
 
 
 def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Results and episodes of a finished run.
+    """Read results and episodes of a finished run.
 
     Raises
     ------
     UserError
-        Where a file is missing, cannot be read, or the results are not those of the episodes.
+        Where a file is missing or damaged, or the results do not match the episodes.
     """
     try:
         runs = results.read_csv(folder / RESULTS)
@@ -242,7 +257,7 @@ def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def show_run(cfg: DictConfig, folder: Path) -> None:
-    """Print the table of a run's folder by room and sound, and how hard its episodes are."""
+    """Print the results of a run by scene and sound, and by difficulty of the episodes."""
     privileged = [agent_label(cfg)] if cfg.agent.privileged else []
     runs, episodes = read_run(folder)
     table.print_tables(runs, episodes, privileged=privileged)
@@ -250,7 +265,7 @@ def show_run(cfg: DictConfig, folder: Path) -> None:
 
 
 def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
-    """TensorBoard's scalars by room and sound, and hparams with SR and SPL to compare runs by."""
+    """Write TensorBoard scalars by scene and sound, and hparams with SR and SPL."""
     settings = {key: cfg[key].name for key in ("agent", "protocol", "acoustics", "split")}
     settings |= {key: cfg[key].name for key in ("sound_model", "mapper", "planner")}
     settings |= {"seed": cfg.seed, "train_seed": cfg.train_seed, "episodes": cfg.episodes}

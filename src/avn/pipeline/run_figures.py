@@ -1,4 +1,4 @@
-"""Pictures of finished runs: trajectories, estimates, beliefs, memory, results by difficulty."""
+"""Figures of finished runs: trajectories, estimates, beliefs, memory, results by difficulty."""
 
 from __future__ import annotations
 
@@ -23,16 +23,18 @@ _SUFFIX = ".figures"
 
 
 def draw_runs(runs: Sequence[Run], show: str, count: int, episodes: Sequence[int] | None) -> None:
-    """Write the pictures of some runs into the first one's folder and its TensorBoard.
+    """Write the figures of some runs to the folder and the TensorBoard of the first run.
 
     Parameters
     ----------
     runs : sequence of Run
-        Over the same episodes.
-    show, count : str, int
-        Which episodes are drawn, and how many; see `avn.pipeline.replay.choose`.
+        Runs over the same episodes.
+    show : {"typical", "success", "failure"}
+        Selection of episodes; see `avn.pipeline.replay.choose`.
+    count : int
+        Number of episodes.
     episodes : sequence of int, optional
-        Rows of the first run's `episodes.csv` to draw instead.
+        Rows of the first run's `episodes.csv` to draw instead of the selection.
 
     Raises
     ------
@@ -48,30 +50,35 @@ def draw_runs(runs: Sequence[Run], show: str, count: int, episodes: Sequence[int
         "breakdown": breakdown_figure(dict(zip(names, (r.episodes for r in runs), strict=True)))
     }
     if labels:
-        walked = [replay.traces(run, replay.same_episodes(first, labels, run)) for run in runs]
-        made |= episode_figures(walked, names)
+        traces = [replay.traces(run, replay.same_episodes(first, labels, run)) for run in runs]
+        made |= episode_figures(traces, names)
     else:
         log(f"{first.folder}: no episode to show (--show {show})")
     write_figures(first.folder, made)
 
 
-def episode_figures(walked: Sequence[Sequence[Trace]], names: Sequence[str]) -> dict[str, Figure]:
-    """Pictures of episodes by name, of several runs over the same episodes.
+def episode_figures(traces: Sequence[Sequence[Trace]], names: Sequence[str]) -> dict[str, Figure]:
+    """Draw the figures of episodes of several runs.
 
     Parameters
     ----------
-    walked : sequence of sequences of Trace
-        By run and episode.
+    traces : sequence of sequences of Trace
+        Traces of the same episodes, by run.
     names : sequence of str
-        Of the runs.
+        Names of the runs.
+
+    Returns
+    -------
+    dict of str to Figure
+        Figures by name; those of one episode are of the first run.
     """
-    made = {"trajectories": trajectory_figure(list(zip(*walked, strict=True)), names)}
+    made = {"trajectories": trajectory_figure(list(zip(*traces, strict=True)), names)}
     kinds: tuple[tuple[str, Callable[[Trace, str], Figure]], ...] = (
         ("estimates", estimate_figure),
         ("belief", belief_figure),
         ("memory", memory_figure),
     )
-    for trace in walked[0]:
+    for trace in traces[0]:
         record = trace.record
         for kind, draw in kinds:
             try:
@@ -83,7 +90,7 @@ def episode_figures(walked: Sequence[Sequence[Trace]], names: Sequence[str]) -> 
 
 
 def write_figures(folder: Path, made: dict[str, Figure]) -> None:
-    """Write pictures into a run's folder and its TensorBoard, in the place of older ones."""
+    """Write figures to a run's folder and TensorBoard; older ones are replaced."""
     for old in folder.glob(f"events.*{_SUFFIX}"):
         old.unlink()
     with SummaryWriter(str(folder), filename_suffix=_SUFFIX) as writer:

@@ -1,4 +1,4 @@
-"""Scenes as stages: the geometry of apartments, their late reverberation and direct sound."""
+"""Stages of scenes: geometry, late reverberation and direct sound of apartments."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from avn.pipeline.apartments import (
     scene_folder,
 )
 
-# Settings of an acoustic regime; all others shape the reverberation, which regimes share.
+# Settings of an acoustic regime; the others change the reverberation, which regimes share.
 _REGIME = ("name", "direct_path")
 _HEIGHTS = ("receiver_height", "source_height")
 
 
 def acoustics_of(apartments: Apartments) -> AcousticsConfig:
-    """The acoustics of apartments; raises `UserError` for a value that makes no sense."""
+    """Return the acoustics of apartments; raise `UserError` for an invalid value."""
     return check_config(typed(apartments.node("acoustics")), apartments.world.acoustics)
 
 
@@ -36,50 +36,50 @@ def _keys(apartments: Apartments, names: Sequence[str]) -> list[str]:
 
 
 class Geometry(PerApartment):
-    """Free cells, shortest distances and lines of sight of apartments."""
+    """Stage of free cells, shortest distances and lines of sight."""
 
     kind = "generate/geometry"
 
     def settings(self) -> Sequence[str]:
-        """The heights of ears and sources, between which there is a line of sight or none."""
+        """Return the keys of the heights of receiver and source, which the lines of sight use."""
         return _keys(self.apartments, _HEIGHTS)
 
     def content_of(self, plan: FloorPlan) -> Any:
-        """The floor plan."""
+        """Return the hash of the floor plan."""
         return plan_hash(plan)
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         return f"geometry of {self.apartments.title}"
 
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
-        """The file of an apartment."""
+        """Return the path of an apartment's file."""
         return scene_folder(self.cfg, plan) / f"geometry-{fingerprint[:8]}.h5"
 
     def check(self) -> None:
-        """Refuse floor plans and acoustics that cannot be."""
+        """Refuse invalid floor plans and acoustics."""
         acoustics_of(self.apartments)
         for plan in self.apartments.plans:
             build.check_plan(plan)
 
     def make(self) -> None:
-        """Write the files that are missing."""
+        """Compute and write the missing files."""
         acoustics = acoustics_of(self.apartments)
         for index in self.missing():
             plan, path = self.apartments.plans[index], self.paths[index]
             build.build_geometry(plan, acoustics, path, self.fingerprints[index])
 
     def load(self) -> list[Scene]:
-        """The scene of each apartment."""
+        """Return the scene of each apartment."""
         return [load_scene(*file) for file in zip(self.paths, self.fingerprints, strict=True)]
 
 
 class _Acoustic(PerApartment):
-    """What stages share that are made by the acoustics of a world."""
+    """Base class of the stages of a world's acoustics."""
 
     def check(self) -> None:
-        """Refuse acoustics that cannot be."""
+        """Refuse invalid acoustics."""
         acoustics_of(self.apartments)
         check_processes(self.cfg)
         check_name(
@@ -88,72 +88,72 @@ class _Acoustic(PerApartment):
 
 
 class LateReverberation(_Acoustic):
-    """Sound that reaches each cell after reflections, traced; the regimes share it."""
+    """Stage of late reverberation by ray tracing; acoustic regimes share it."""
 
     kind = "generate/late_reverberation"
 
     def needs(self) -> Sequence[Geometry]:
-        """The geometry of the same apartments."""
+        """Return the stage of the geometry."""
         return (Geometry(self.cfg, self.apartments),)
 
     def settings(self) -> Sequence[str]:
-        """The acoustics, without what tells the regimes apart."""
+        """Return the key of the acoustics."""
         return (self.apartments.world.acoustics,)
 
     def ignored(self) -> Sequence[str]:
-        """What tells the regimes apart."""
+        """Return the keys of the acoustic regime."""
         return _keys(self.apartments, _REGIME)
 
     def content(self) -> Any:
-        """The tables of materials and heads."""
+        """Return the hash of the tables of materials and head-related impulse responses."""
         return brir.assets_hash()
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         return f"reverberation of {self.apartments.title}"
 
     def seconds(self) -> float:
-        """About 20 ms for each pair of source and cell."""
+        """Estimate 20 ms per pair of source and cell."""
         return self.apartments.pairs * 0.02 / max(1, self.cfg.processes)
 
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
-        """The file of an apartment."""
+        """Return the path of an apartment's file."""
         return scene_folder(self.cfg, plan) / f"acoustics-tail-{fingerprint[:8]}.h5"
 
     def make(self) -> None:
-        """Trace what is missing, in worker processes."""
+        """Trace the missing files in worker processes."""
         scenes, acoustics = self.needs()[0].load(), acoustics_of(self.apartments)
         files = [(scenes[i], self.paths[i], self.fingerprints[i]) for i in self.missing()]
         build.build_reverberation(files, acoustics, self.cfg.processes)
 
 
 class DirectSound(_Acoustic):
-    """First arrivals in a regime; with the reverberation these are the impulse responses."""
+    """Stage of direct sound in an acoustic regime, the early part of the impulse responses."""
 
     kind = "generate/direct_sound"
 
     def needs(self) -> Sequence[Any]:
-        """The geometry and the reverberation of the same apartments."""
-        own = (self.cfg, self.apartments)
-        return (Geometry(*own), LateReverberation(*own))
+        """Return the stages of geometry and late reverberation."""
+        arguments = (self.cfg, self.apartments)
+        return (Geometry(*arguments), LateReverberation(*arguments))
 
     def settings(self) -> Sequence[str]:
-        """What tells the regimes apart."""
+        """Return the keys of the acoustic regime."""
         return _keys(self.apartments, _REGIME)
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         return f"sound of {self.apartments.title} ({self.apartments.node('acoustics').name})"
 
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
-        """The file of an apartment."""
+        """Return the path of an apartment's file."""
         regime = self.apartments.node("acoustics").name
         return scene_folder(self.cfg, plan) / f"acoustics-{regime}-{fingerprint[:8]}.h5"
 
     def make(self) -> None:
-        """Write the files that are missing."""
+        """Compute and write the missing files."""
         scenes, acoustics = self.needs()[0].load(), acoustics_of(self.apartments)
         for index in self.missing():
             build.build_direct_sound(
@@ -161,7 +161,7 @@ class DirectSound(_Acoustic):
             )
 
     def load(self) -> list[AudibleScene]:
-        """The scene of each apartment with its binaural impulse responses."""
+        """Return the scene of each apartment with its binaural room impulse responses."""
         geometry, tails = self.needs()
         tail_files = zip(tails.paths, tails.fingerprints, strict=True)
         first_files = zip(self.paths, self.fingerprints, strict=True)

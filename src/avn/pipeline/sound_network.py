@@ -1,4 +1,4 @@
-"""The sound network and where it takes the source of every clip to be, as stages."""
+"""Stages of the sound network and of its source estimates for every clip."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from avn.pipeline.trained_on_clips import TrainedOnClips
 from avn.reporting.sound_figures import SoundFigures
 
 
-def hears(cfg: DictConfig) -> bool:
-    """Whether the config has a sound model."""
+def has_sound_model(cfg: DictConfig) -> bool:
+    """Return whether the config has a sound network."""
     return bool(cfg.sound_model.name != "none")
 
 
 class SoundNetwork(TrainedOnClips):
-    """The network that says where a source is."""
+    """Stage of the network that estimates the location of a source."""
 
     kind = "train/sound_cnn"
     node = "sound_model"
@@ -30,39 +30,39 @@ class SoundNetwork(TrainedOnClips):
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         recipe, acoustics = self.cfg.sound_model, self.train.node("acoustics").name
         return f"sound network '{recipe.name}' ({acoustics}, train_seed {recipe.train_seed})"
 
     def untrained(self) -> SoundCnn:
-        """The network before training."""
+        """Return the network with its initial weights."""
         torch.manual_seed(self.cfg.sound_model.train_seed)
         model: SoundCnn = build_object("sound_model", self.cfg.sound_model, rate=self.rate)
         return model
 
     def data(self) -> SoundData:
-        """Clips and where their sources are."""
+        """Return the data module of clips and source locations."""
         return SoundData(**self.clips())
 
     def callbacks(self) -> Sequence[Callback]:
-        """What shows figures in TensorBoard."""
+        """Return callbacks that log figures to TensorBoard."""
         return (SoundFigures(),)
 
 
 class SourceEstimates(AudioInference):
-    """Where the sound network takes the source of every clip to be.
+    """Stage of the source estimates of every clip.
 
-    Its product is (K, S, sounds, takes, 2) float32 for each apartment: metres right and front.
+    The product is (K, S, sounds, realisations, 2) float32 per apartment: metres right and front.
     """
 
     kind = "hear/source_estimates"
 
     @property
     def network(self) -> SoundNetwork:
-        """The sound network."""
+        """Stage of the sound network."""
         return SoundNetwork(self.cfg)
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         return f"source estimates by '{self.cfg.sound_model.name}' in {self.apartments.title}"

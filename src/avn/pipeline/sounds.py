@@ -11,17 +11,17 @@ from avn.acoustics.dry_sounds import content_hash, load_sounds
 from avn.core.errors import UserError
 from avn.core.files import check_name
 from avn.core.settings import plain
-from avn.pipeline.apartments import TEST, World
+from avn.pipeline.apartments import TEST, WorldKeys
 from avn.reporting.results import ALL_SOUNDS
 
 
-def sound_files(cfg: DictConfig, world: World = TEST) -> dict[str, str]:
-    """The sounds of a world: name to built-in recording or path.
+def sound_files(cfg: DictConfig, world: WorldKeys = TEST) -> dict[str, str]:
+    """Return the sounds of a world: name to built-in recording or path.
 
     Raises
     ------
     UserError
-        For a name that tables and folders need for something else.
+        For an invalid or reserved name.
     """
     sounds = {str(name): str(path) for name, path in plain(cfg, world.sounds).items()}
     for name in sounds:
@@ -31,12 +31,12 @@ def sound_files(cfg: DictConfig, world: World = TEST) -> dict[str, str]:
     return sounds
 
 
-def dry_sounds(cfg: DictConfig, world: World = TEST) -> DrySounds:
-    """The recordings of a world; raises `UserError` where one cannot be read."""
+def dry_sounds(cfg: DictConfig, world: WorldKeys = TEST) -> DrySounds:
+    """Load the recordings of a world; raise `UserError` where one cannot be read."""
     rate = int(OmegaConf.select(cfg, world.acoustics).rate)
     return DrySounds(load_sounds(sound_files(cfg, world), rate), rate=rate)
 
 
-def sounds_content(cfg: DictConfig, world: World = TEST) -> list[Any]:
-    """The sounds of a world in their order, each with a hash of its recording."""
+def sounds_content(cfg: DictConfig, world: WorldKeys = TEST) -> list[Any]:
+    """Return the names of a world's sounds in order, each with the hash of its recording."""
     return list(content_hash(sound_files(cfg, world)).items())

@@ -1,9 +1,9 @@
-"""Stages: products that are made once, each declared in one place.
+"""Stages: products of the pipeline with declared dependencies, cached by fingerprint.
 
-A stage says which stages it needs, which settings it reads, and how it is made. Its fingerprint
-follows from these: equal configs share one product, and a setting that a product does not read
-never makes it anew. The plan of a command follows too, and with it the time that is left and
-which settings of a config nothing reads.
+A stage declares the stages that it needs, the settings that it reads, and how it is made. Its
+fingerprint follows from these: equal configs share one product, and a change of a setting rebuilds
+only the products that read it. The plan of a command, the estimate of its duration and the settings
+that it does not read follow too.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from avn.core.hashing import digest
 from avn.core.progress import format_duration, log
 from avn.core.settings import leaves, values
 
-# What every stage reads besides its own settings; none of it changes a product.
+# Settings that every stage reads and that change no product.
 MACHINE = ("outputs", "processes", "auto")
-# Seconds that each stage took that this process made, by title.
-spent: dict[str, float] = {}
+# Seconds that this process took for each stage that it made, by title.
+timings: dict[str, float] = {}
 
 
 class Stage(ABC):
-    """A product of the pipeline.
+    """Product of the pipeline.
 
     Parameters
     ----------
     cfg : DictConfig
-        The config of a command.
+        Config of a command.
 
     Attributes
     ----------
     kind : str
-        Names the product among all kinds, and its folder below `outputs`.
+        Name of the kind of product, part of the fingerprint.
     version : int
-        Raised when the code of the stage changes its product.
+        Version of the product; raised when its code changes the product.
     """
 
     kind: ClassVar[str]
@@ -52,63 +52,63 @@ class Stage(ABC):
     def __init__(self, cfg: DictConfig) -> None:
         self.cfg = cfg
 
-    # What is declared.
+    # Declared by subclasses.
 
     def needs(self) -> Sequence[Stage]:
-        """Stages without which it cannot be made; their fingerprints enter its own."""
+        """Return the stages that it depends on; their fingerprints enter its own."""
         return ()
 
     def settings(self) -> Sequence[str]:
-        """Dotted keys of the config whose values enter the fingerprint, whole nodes or leaves."""
+        """Return the dotted keys, nodes or leaves, whose values enter the fingerprint."""
         return ()
 
     def ignored(self) -> Sequence[str]:
-        """Keys below those of `settings` that this product does not read."""
+        """Return the keys below those of `settings` that the product does not depend on."""
         return ()
 
     def consulted(self) -> Sequence[str]:
-        """Keys that it reads and whose values stay out of the fingerprint.
+        """Return the keys that it reads and whose values are not in the fingerprint.
 
-        Either they change no product, such as labels, or `content` holds what they stand for.
+        Either they change no product, such as labels, or `content` holds what they refer to.
         """
         return ()
 
     def content(self) -> Any:
-        """What enters the fingerprint besides: floor plans, hashes of files, own arguments."""
+        """Return further content of the fingerprint: floor plans, hashes of files, arguments."""
         return None
 
     @property
     @abstractmethod
     def title(self) -> str:
-        """What it is, for the lines that the user reads."""
+        """Title of the product, for messages."""
 
     @property
     @abstractmethod
     def folder(self) -> Path:
-        """Where it lies, or will."""
+        """Folder of the product, which may not exist yet."""
 
     def seconds(self) -> float:
-        """How long it takes on two cores, roughly, once all that it needs is there."""
+        """Estimate the duration on two cores in seconds, without that of its needs."""
         return 0.0
 
     def check(self) -> None:
-        """Raise `UserError` for settings that cannot work, before anything is made."""
+        """Raise `UserError` for settings that cannot work, before anything is built."""
         return
 
     def by_products(self) -> Sequence[Stage]:
-        """Stages whose products are written along the way when this one is made."""
+        """Return the stages whose products are written when this one is made."""
         return ()
 
     @abstractmethod
     def done(self) -> bool:
-        """Whether the product is there; whether it is whole shows on reading."""
+        """Return whether the product exists; it is checked for damage on reading."""
 
     @abstractmethod
     def make(self) -> None:
-        """Make what is missing of it, on needs that are there; goes on where it was killed."""
+        """Make what is missing of the product, given its needs; resumes after an interruption."""
 
     def load(self) -> Any:
-        """The product, read from where it lies.
+        """Read the product.
 
         Raises
         ------
@@ -117,45 +117,45 @@ class Stage(ABC):
         """
         raise TypeError(f"{self.kind} is read by the stages that need it")
 
-    # What follows.
+    # Derived from the above.
 
     @cached_property
     def needed(self) -> tuple[Stage, ...]:
-        """What `needs` says, asked once."""
+        """Result of `needs`, cached."""
         return tuple(self.needs())
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256, in hex, of all that the product depends on."""
-        own = values(self.cfg, self.settings(), self.ignored())
+        """SHA-256 of all that the product depends on, in hex."""
+        settings = values(self.cfg, self.settings(), self.ignored())
         needed = [need.fingerprint for need in self.needed]
-        return digest(self.kind, self.version, own, self.content(), needed)
+        return digest(self.kind, self.version, settings, self.content(), needed)
 
     def locks(self) -> Sequence[Path]:
-        """Paths that only one process may be making at a time, in a fixed order."""
+        """Return the paths that only one process may write at a time, in a fixed order."""
         return (self.folder,)
 
     def read(self) -> set[str]:
-        """Leaf keys of the config that this stage and all that it needs read."""
-        every: dict[str, Stage] = {}
+        """Return the leaf keys of the config that this stage and all its dependencies read."""
+        visited: dict[str, Stage] = {}
         left: list[Stage] = [self]
         while left:
             stage = left.pop()
-            if stage.fingerprint not in every:
-                every[stage.fingerprint] = stage
+            if stage.fingerprint not in visited:
+                visited[stage.fingerprint] = stage
                 left.extend(stage.needed)
-        return set().union(*(stage.read_here() for stage in every.values()))
+        return set().union(*(stage.read_here() for stage in visited.values()))
 
     def read_here(self) -> set[str]:
-        """Leaf keys of the config that this stage reads, without what it needs."""
+        """Return the leaf keys of the config that this stage reads, without its dependencies."""
         keys = (*MACHINE, *self.settings(), *self.consulted())
         return leaves(self.cfg, keys, self.ignored())
 
 
 def missing(stages: Iterable[Stage]) -> list[Stage]:
-    """What must be made for some stages, themselves included, each once and in order.
+    """Return the stages to make for some stages, themselves included, each once and in order.
 
-    Writes nothing. Stages below one that is done are not looked at.
+    Nothing is written. The dependencies of a stage that is done are not examined.
 
     Raises
     ------
@@ -163,49 +163,50 @@ def missing(stages: Iterable[Stage]) -> list[Stage]:
         Where settings of one of them cannot work.
     """
     wanted = list(stages)
-    found = _ordered(wanted, {})
-    along = {own.fingerprint: stage for stage in found for own in stage.by_products()}
-    # who writes a by-product takes its place, so that nobody makes it twice
-    return _ordered(wanted, along) if along else found
+    ordered = _ordered(wanted, {})
+    writers = {product.fingerprint: stage for stage in ordered for product in stage.by_products()}
+    # the stage that writes a by-product replaces it, so that it is not made twice
+    return _ordered(wanted, writers) if writers else ordered
 
 
 def _ordered(stages: Iterable[Stage], instead: Mapping[str, Stage]) -> list[Stage]:
-    found: dict[str, Stage] = {}
+    ordered: dict[str, Stage] = {}
 
     def collect(stage: Stage) -> None:
         stage = instead.get(stage.fingerprint, stage)
-        if stage.fingerprint in found or stage.done():
+        if stage.fingerprint in ordered or stage.done():
             return
         stage.check()
         for need in stage.needed:
             collect(need)
-        found[stage.fingerprint] = stage
+        ordered[stage.fingerprint] = stage
 
     for stage in stages:
         collect(stage)
-    return list(found.values())
+    return list(ordered.values())
 
 
 def build(stage: Stage, explicit: bool = False) -> None:
-    """Make a stage and what it needs, as far as it is missing.
+    """Make a stage and its dependencies where they are missing.
 
     Parameters
     ----------
+    stage : Stage
+        Stage to make.
     explicit : bool
-        Whether it is this product that the user asked for: then `auto=false`, which refuses to
-        make what is missing, does not refuse this one.
+        Whether the user asked for this product: then `auto=false` does not refuse to make it.
 
     Raises
     ------
     UserError
-        Where something is missing and `auto` is false, or settings cannot work.
+        Where a product is missing and `auto` is false, or settings cannot work.
     """
-    for own in missing([stage]):
-        make(own, explicit=explicit and own.fingerprint == stage.fingerprint)
+    for step in missing([stage]):
+        make(step, explicit=explicit and step.fingerprint == stage.fingerprint)
 
 
 def make(stage: Stage, explicit: bool = False) -> None:
-    """Make a stage whose needs are there, unless it is done or another process makes it."""
+    """Make a stage whose needs exist, unless it is done; wait where another process makes it."""
     if stage.done():
         return
     if not (stage.cfg.auto or explicit):
@@ -220,12 +221,12 @@ def make(stage: Stage, explicit: bool = False) -> None:
         started = time.perf_counter()
         stage.make()
         took = time.perf_counter() - started
-        spent[stage.title] = spent.get(stage.title, 0.0) + took
+        timings[stage.title] = timings.get(stage.title, 0.0) + took
         log(f"{stage.title} made in {format_duration(took)}: {stage.folder}")
 
 
 def missing_error(stage: Stage) -> UserError:
-    """The error where something is missing that must not be made."""
+    """Return the error for a missing product that must not be made."""
     return UserError(
         f"{stage.folder}: {stage.title} is missing and auto=false; leave auto=true to make it"
     )

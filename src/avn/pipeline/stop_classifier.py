@@ -1,4 +1,4 @@
-"""The stop classifier and how likely it takes every clip to be heard at the goal, as stages."""
+"""Stages of the stop classifier and of its probabilities for every clip."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.trained_on_clips import TrainedOnClips
 from avn.reporting.stop_figures import StopFigures
 
-# How it decides; no part of what is learned.
+# Keys of the decision, which the network does not depend on.
 DECISION = ("stop_model.criterion", "stop_model.threshold")
 
 
-def can_stop(cfg: DictConfig) -> bool:
-    """Whether the config has a stop classifier."""
+def has_stop_model(cfg: DictConfig) -> bool:
+    """Return whether the config has a stop classifier."""
     return bool(cfg.stop_model.name != "none")
 
 
 class StopNetwork(TrainedOnClips):
-    """The network that says whether a source is within reach.
+    """Stage of the network that estimates whether the agent is at the goal.
 
-    The goal that it knows is that of the protocol: its 3 x 3 cells, or its radius.
+    The goal is that of the protocol: 3 x 3 cells, or a radius.
     """
 
     kind = "train/stop_classifier"
@@ -39,60 +39,60 @@ class StopNetwork(TrainedOnClips):
     without = "stop_model: 'none' cannot say Stop; choose cnn5"
 
     def settings(self) -> Sequence[str]:
-        """The recipe, the microphone and the goal."""
+        """Return the keys of the recipe, the microphone and the goal."""
         radius = ("protocol.radius",) if self.cfg.protocol.goal == "radius" else ()
         return (*super().settings(), "protocol.goal", *radius)
 
     def ignored(self) -> Sequence[str]:
-        """How it decides."""
+        """Return the keys of the decision."""
         return DECISION
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         recipe, acoustics = self.cfg.stop_model, self.train.node("acoustics").name
         settings = f"{acoustics}, {self.cfg.protocol.goal}, train_seed {recipe.train_seed}"
         return f"stop classifier '{recipe.name}' ({settings})"
 
     def untrained(self) -> StopClassifier:
-        """The network before training."""
+        """Return the network with its initial weights."""
         model: StopClassifier = build_object("stop_model", self.cfg.stop_model, rate=self.rate)
         return model
 
     def data(self) -> StopData:
-        """Clips and how many moves the goal is away."""
+        """Return the data module of clips and moves to the goal."""
         protocol: Protocol = build_object("protocol", self.cfg.protocol)
         return StopData(
             **self.clips(), goal=lambda scene: protocol.goal_cells(scene.grid, scene.sources)
         )
 
     def callbacks(self) -> Sequence[Callback]:
-        """What shows figures in TensorBoard."""
+        """Return callbacks that log figures to TensorBoard."""
         return (StopFigures(),)
 
     def measure(self, model: StopClassifier, data: StopData) -> dict[str, Any]:
-        """Thresholds and error rates over one take of every clip of the validation apartments."""
+        """Return thresholds and error rates over one realisation of every validation clip."""
         clips = data.measured_clips["validation"]
         scores, what = StopScores(data.sounds.names), "choosing a threshold"
         with torch.inference_mode(), progress_bar(what, len(clips), "clips") as done:
             for batch in data.loader(clips, list(range(len(clips)))):
-                said = torch.sigmoid(model.log_odds(batch["pictures"].to(model.device))).cpu()
-                scores.update(said, batch["target"], batch["in_sight"], batch["sound"])
-                done(len(said))
-        figures: dict[str, Any] = {}
+                estimate = torch.sigmoid(model.log_odds(batch["pictures"].to(model.device))).cpu()
+                scores.update(estimate, batch["target"], batch["in_sight"], batch["sound"])
+                done(len(estimate))
+        metrics: dict[str, Any] = {}
         for name, value in scores.compute().items():
             kind, group = name.split("/", 1)
-            figures[f"{kind}/validation/{group}"] = float(value)
+            metrics[f"{kind}/validation/{group}"] = float(value)
         for criterion in CRITERIA:
             threshold = best_threshold(*scores.scores(), criterion)
-            figures[f"threshold/{criterion}"] = threshold
+            metrics[f"threshold/{criterion}"] = threshold
             for name, rate in scores.at(threshold).items():
                 kind, group = name.split("/", 1)
-                figures[f"{kind}/{criterion}/{group}"] = rate
-        return figures
+                metrics[f"{kind}/{criterion}/{group}"] = rate
+        return metrics
 
     def threshold(self) -> float:
-        """The probability from which on the agent stops: the config's, or the one chosen.
+        """Return the probability at which the agent stops: set, or selected by the criterion.
 
         Raises
         ------
@@ -107,9 +107,9 @@ class StopNetwork(TrainedOnClips):
 
 
 class StopProbabilities(AudioInference):
-    """How likely every clip is heard at the goal.
+    """Stage of the probabilities that every clip is heard at the goal.
 
-    Its product is (K, S, sounds, takes) float32 for each apartment; the takes are those of
+    The product is (K, S, sounds, realisations) float32 per apartment; the clips are those of
     `SourceEstimates`.
     """
 
@@ -117,10 +117,10 @@ class StopProbabilities(AudioInference):
 
     @property
     def network(self) -> StopNetwork:
-        """The stop classifier."""
+        """Stage of the stop classifier."""
         return StopNetwork(self.cfg)
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         return f"stop probabilities by '{self.cfg.stop_model.name}' in {self.apartments.title}"

@@ -1,4 +1,4 @@
-"""Trained networks as stages: a folder with checkpoints and what was measured."""
+"""Base classes of trained networks as stages: a folder with checkpoints and metrics."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ METRICS, CHECKSUM = "metrics.json", "best.ckpt sha256"
 
 
 class Trained(Stage):
-    """A network with its weights, trained in the training world.
+    """Stage of a network that is trained in the training world.
 
     Attributes
     ----------
@@ -34,17 +34,17 @@ class Trained(Stage):
 
     @property
     def train(self) -> Apartments:
-        """The apartments on which it is trained."""
+        """Apartments of the training data."""
         return Apartments(self.cfg, "train", TRAINING)
 
     @property
     def validation(self) -> Apartments:
-        """The apartments on which its best epoch is chosen."""
+        """Apartments on which the best epoch is selected."""
         return Apartments(self.cfg, "validation", TRAINING)
 
     @property
     def name(self) -> str:
-        """The name of its folder, before the hash."""
+        """Name of the folder, without the hash."""
         return self.kind.split("/")[1]
 
     @property
@@ -53,11 +53,11 @@ class Trained(Stage):
         return stage_folder(self.cfg.outputs, "train", self.name, self.fingerprint)
 
     def done(self) -> bool:
-        """Whether it has been trained to the end."""
+        """Return whether the training is finished."""
         return (self.folder / METRICS).is_file()
 
     def metrics(self) -> dict[str, Any]:
-        """What its training measured; raises `UserError` where the file is damaged."""
+        """Read the metrics of the training; raise `UserError` where the file is damaged."""
         path = self.folder / METRICS
         try:
             return dict(json.loads(path.read_text()))
@@ -65,14 +65,14 @@ class Trained(Stage):
             raise UserError(f"{path}: damaged; delete {self.folder} to train again") from error
 
     def finish(self, metrics: dict[str, Any], recipe: dict[str, Any]) -> None:
-        """Write `metrics.json` and the model card, which end a training."""
+        """Write `metrics.json` and the model card, which mark the training as finished."""
         metrics = metrics | {CHECKSUM: file_hash(self.folder / training.BEST)}
         with atomic_write(self.folder / METRICS) as part:
             part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
         write_card(self.folder, self.title, self._setting(), recipe, metrics)
 
     def check_weights(self) -> None:
-        """Raise `UserError` where the best checkpoint is not the one that was measured."""
+        """Raise `UserError` where the best checkpoint has changed since the training."""
         best = self.folder / training.BEST
         if self.metrics().get(CHECKSUM) != file_hash(best):
             raise UserError(
@@ -80,7 +80,7 @@ class Trained(Stage):
             )
 
     def _setting(self) -> dict[str, str]:
-        """What it was trained and measured on, for the card."""
+        """Return the data of training and validation, for the model card."""
         split, acoustics = self.train.node("split").name, self.train.node("acoustics").name
         return {
             "setting": f"split `{split}`, acoustics `{acoustics}`",
@@ -90,37 +90,37 @@ class Trained(Stage):
 
 
 class Fitted(Trained):
-    """A network that Lightning fits to a data module."""
+    """Stage of a network that Lightning fits to a data module."""
 
     @abstractmethod
     def untrained(self) -> Network:
-        """The network of the config, with the weights that training begins with."""
+        """Return the network with its initial weights."""
 
     @abstractmethod
     def data(self) -> L.LightningDataModule:
-        """What it is trained on."""
+        """Return the data module."""
 
     def check(self) -> None:
-        """Refuse a recipe that cannot work."""
+        """Refuse an invalid recipe."""
         self.untrained()
 
     def measure(self, model: Any, data: Any) -> dict[str, Any]:
-        """Metrics of the trained network beside those of the training."""
+        """Compute metrics of the trained network in addition to those of the training."""
         return {}
 
     def callbacks(self) -> Sequence[Callback]:
-        """Callbacks of the training, such as those that show figures in TensorBoard."""
+        """Return callbacks of the training, such as those that log figures to TensorBoard."""
         return ()
 
     def make(self) -> None:
-        """Train it, or go on where a killed training was."""
+        """Train the network, or resume an interrupted training."""
         model = self.untrained()
         data = self.data()
         metrics = training.fit(data, model, self.folder, self.callbacks())
         self.finish(metrics | self.measure(model, data), dict(model.hparams))
 
     def load(self) -> Any:
-        """The trained network.
+        """Return the trained network.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Networks that are trained on clips of the training world, as stages."""
+"""Base class of stages of networks that are trained on clips of the training world."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from avn.pipeline.trained import Fitted
 
 
 class TrainedOnClips(Fitted):
-    """A network that listens.
+    """Stage of a network that is trained on binaural clips.
 
     Attributes
     ----------
     node : str
-        The node of the config that holds its recipe.
+        Config node of the recipe.
     without : str
-        What is said where the config has none.
+        Message for a config without such a network.
     """
 
     node: ClassVar[str]
     without: ClassVar[str]
 
     def check(self) -> None:
-        """Refuse a config that has no such network."""
+        """Refuse a config without such a network, and an invalid recipe."""
         if self.cfg[self.node].name == "none":
             raise UserError(self.without)
         super().check()
@@ -40,27 +40,27 @@ class TrainedOnClips(Fitted):
         return int(self.train.node("acoustics").rate)
 
     def needs(self) -> Sequence[DirectSound]:
-        """The sound of the training and validation apartments."""
+        """Return the stages of the acoustics of the training and validation apartments."""
         return (DirectSound(self.cfg, self.train), DirectSound(self.cfg, self.validation))
 
     def settings(self) -> Sequence[str]:
-        """The recipe, and what records the clips."""
+        """Return the keys of the recipe and the microphone."""
         return (self.node, TRAINING.microphone)
 
     def consulted(self) -> Sequence[str]:
-        """The sounds, whose recordings are in the fingerprint."""
+        """Return the key of the sounds; the fingerprint holds their recordings instead."""
         return (TRAINING.sounds,)
 
     def content(self) -> Any:
-        """The recordings."""
+        """Return the hashes of the recordings."""
         return sounds_content(self.cfg, TRAINING)
 
     def seconds(self) -> float:
-        """By the number of pairs and of epochs."""
+        """Estimate the duration from the numbers of pairs and epochs."""
         return float(4 * self.train.pairs * self.cfg[self.node].epochs / 600)
 
     def clips(self) -> dict[str, Any]:
-        """What every data module of clips takes."""
+        """Return the common arguments of data modules of clips."""
         train, validation = (need.load() for need in self.needs())
         return {
             "train": train,

@@ -1,4 +1,4 @@
-"""Views of every state of apartments as a stage."""
+"""Stage of rendered views of every state."""
 
 from __future__ import annotations
 
@@ -26,14 +26,16 @@ from avn.views.renderer import renderer_class
 
 
 class RenderedViews(PerApartment):
-    """RGB and depth of every state of apartments.
+    """Stage of RGB and depth views of every state.
 
     Parameters
     ----------
     cfg : DictConfig
+        Config of a command.
     apartments : Apartments
+        Apartments to render.
     appearance_seed : int
-        Which draw of furniture, patterns and light from the pool of their part.
+        Number of the sample of furniture models, textures and light from the subset's pool.
     """
 
     kind = "generate/views"
@@ -43,49 +45,49 @@ class RenderedViews(PerApartment):
         self.appearance_seed = appearance_seed
 
     def settings(self) -> Sequence[str]:
-        """What renders them."""
+        """Return the key of the renderer."""
         return ("renderer",)
 
     def content(self) -> Any:
-        """The pool, the draw from it, and the assets."""
-        return self.apartments.part, self.appearance_seed, assets_hash()
+        """Return the subset's pool, the sample's number, and the hash of the assets."""
+        return self.apartments.subset, self.appearance_seed, assets_hash()
 
     def content_of(self, plan: FloorPlan) -> Any:
-        """The floor plan."""
+        """Return the hash of the floor plan."""
         return plan_hash(plan)
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         name = self.cfg.renderer.name
         return f"views of {self.apartments.title} ({name}" + (
             f", appearance {self.appearance_seed})" if self.appearance_seed else ")"
         )
 
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
-        """The file of an apartment."""
+        """Return the path of an apartment's file."""
         name = f"views-{self.cfg.renderer.name}-{fingerprint[:8]}.h5"
         return scene_folder(self.cfg, plan) / name
 
     def seconds(self) -> float:
-        """About 60 ms a view, and a minute an apartment for its light."""
+        """Estimate 60 ms per view, and a minute per apartment for its light."""
         apartments = self.apartments
         seconds = 4 * apartments.cells * 0.06 + 60 * len(apartments.plans)
         return seconds / max(1, self.cfg.processes)
 
     def check(self) -> None:
-        """Refuse a renderer that cannot work."""
+        """Refuse an invalid renderer."""
         check_processes(self.cfg)
         check_name("renderer.name", self.cfg.renderer.name)
         renderer = typed(self.cfg.renderer)
         renderer_class(renderer).check(renderer)
 
     def make(self) -> None:
-        """Render what is missing, in worker processes."""
+        """Render the missing files in worker processes."""
         files = [
             ViewsFile(
                 self.apartments.plans[i],
-                self.apartments.part,
+                self.apartments.subset,
                 self.appearance_seed,
                 self.paths[i],
                 self.fingerprints[i],
@@ -95,6 +97,8 @@ class RenderedViews(PerApartment):
         build_views(files, typed(self.cfg.renderer), self.cfg.processes)
 
     def load(self) -> list[Views]:
-        """The views of each apartment, mapped from the files."""
+        """Return the views of each apartment, memory-mapped from the files."""
         files = zip(self.apartments.plans, self.paths, self.fingerprints, strict=True)
-        return [read_views(path, 4 * cells_of(plan), own) for plan, path, own in files]
+        return [
+            read_views(path, 4 * cells_of(plan), fingerprint) for plan, path, fingerprint in files
+        ]

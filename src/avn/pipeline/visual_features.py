@@ -1,4 +1,4 @@
-"""Visual embeddings, by which places are known again, as a stage."""
+"""Stage of visual embeddings, features of views by a pre-trained backbone."""
 
 from __future__ import annotations
 
@@ -20,55 +20,55 @@ from avn.views.backbone import backbone_class, backbone_hash, features
 
 
 class VisualEmbeddings(PerApartment):
-    """What a backbone makes of every view of apartments."""
+    """Stage of visual embeddings of every view."""
 
     kind = "generate/visual_embeddings"
 
     def needs(self) -> Sequence[RenderedViews]:
-        """The views."""
+        """Return the stage of the views."""
         return (RenderedViews(self.cfg, self.apartments),)
 
     def consulted(self) -> Sequence[str]:
-        """The backbone, whose weights are in the fingerprint."""
+        """Return the keys of split and backbone; the fingerprint holds their content instead."""
         return (*super().consulted(), "backbone")
 
     def content(self) -> Any:
-        """The backbone's weights and input size."""
+        """Return the hash of the backbone's weights and input size."""
         return backbone_hash(typed(self.cfg.backbone))
 
     @property
     def title(self) -> str:
-        """What it is."""
+        """Title of the product, for messages."""
         return f"visual embeddings of {self.apartments.title} ({self.cfg.backbone.name})"
 
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
-        """The file of an apartment."""
+        """Return the path of an apartment's file."""
         name = f"features-{self.cfg.backbone.name}-{fingerprint[:8]}.h5"
         return scene_folder(self.cfg, plan) / name
 
     def seconds(self) -> float:
-        """About 10 ms a view."""
+        """Estimate 10 ms per view."""
         return 4 * self.apartments.cells / 100
 
     def check(self) -> None:
-        """Refuse a name that leads the file astray."""
+        """Refuse a name that is no valid file name."""
         check_name("backbone.name", self.cfg.backbone.name)
 
     def make(self) -> None:
-        """Apply the backbone where a file is missing."""
+        """Compute the missing embeddings."""
         config = typed(self.cfg.backbone)
         backbone = backbone_class(config)(config)
         views = self.needs()[0].load()
         for index in self.missing():
             rgb, name = views[index].rgb, self.apartments.plans[index].name
             with progress_bar(f"features of {name}", len(rgb), "views") as done:
-                found = features(backbone, rgb, done)
-            write_features(self.paths[index], found, self.fingerprints[index])
+                embeddings = features(backbone, rgb, done)
+            write_features(self.paths[index], embeddings, self.fingerprints[index])
 
     def load(self) -> list[Tensor]:
-        """The embeddings of each apartment, (S, D) float32, l2-normalised."""
+        """Return the embeddings of each apartment, (S, D) float32, L2-normalised."""
         files = zip(self.apartments.plans, self.paths, self.fingerprints, strict=True)
         return [
-            torch.from_numpy(read_features(path, 4 * cells_of(plan), own))
-            for plan, path, own in files
+            torch.from_numpy(read_features(path, 4 * cells_of(plan), fingerprint))
+            for plan, path, fingerprint in files
         ]

@@ -16,7 +16,7 @@ def source_estimates_table(source_estimates: pd.DataFrame) -> Table:
     Parameters
     ----------
     source_estimates : DataFrame
-        Errors of any number of scenes; see `avn.pipeline.audio_inference.sound_errors`.
+        Errors of any number of scenes; see `avn.pipeline.audio_inference.source_estimate_errors`.
     """
     columns = ("error, m", "bearing error, degrees", "bearing error > 90 degrees")
     table = _table("source estimates: mean over scenes of the median error", columns)
@@ -35,7 +35,7 @@ def local_patches_table(seen: pd.DataFrame) -> Table:
     Parameters
     ----------
     seen : DataFrame
-        Errors over the views of all scenes; see `avn.pipeline.occupancy.window_errors`.
+        Errors over the views of all scenes; see `avn.pipeline.occupancy.local_patch_errors`.
     """
     columns = ("ROC AUC", "accuracy", "calibration error")
     table = _table("local patches: prediction of free cells", columns)

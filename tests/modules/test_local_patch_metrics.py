@@ -3,21 +3,26 @@ import math
 import pytest
 import torch
 
-from avn.modules.window_metrics import WindowScores, calibrated, calibration, window_metrics
+from avn.modules.local_patch_metrics import (
+    LocalPatchScores,
+    calibrated,
+    calibration,
+    local_patch_metrics,
+)
 
 
-def window(*values: float) -> torch.Tensor:
-    """One window whose first cells have these values; the others are 0."""
+def patch(*values: float) -> torch.Tensor:
+    """One patch whose first cells have these values; the others are 0."""
     cells = torch.zeros(25)
     cells[: len(values)] = torch.tensor(values)
     return cells.reshape(1, 5, 5)
 
 
-def test_figures_of_hand_made_windows() -> None:
-    said = window(0.9, 0.6, 0.4, 0.2)
-    free = window(1, 0, 1, 0).bool()
-    visible = window(1, 1, 1, 1).bool()
-    found = window_metrics(said, free, visible)
+def test_metrics_of_hand_made_patches() -> None:
+    said = patch(0.9, 0.6, 0.4, 0.2)
+    free = patch(1, 0, 1, 0).bool()
+    visible = patch(1, 1, 1, 1).bool()
+    found = local_patch_metrics(said, free, visible)
     # Of the four pairs of a free and a taken cell, (0.4, 0.6) alone is the wrong way round.
     assert found["auc/visible"] == pytest.approx(3 / 4)
     assert found["accuracy/visible"] == pytest.approx(1 / 2)
@@ -31,7 +36,7 @@ def test_figures_of_hand_made_windows() -> None:
 
 def test_a_figure_that_cannot_be_is_left_out() -> None:
     free, visible = torch.ones(1, 5, 5).bool(), torch.zeros(1, 5, 5).bool()
-    found = window_metrics(torch.full((1, 5, 5), 0.5), free, visible)
+    found = local_patch_metrics(torch.full((1, 5, 5), 0.5), free, visible)
     assert "auc/all" not in found
     assert not any(name.endswith("visible") for name in found)
 
@@ -66,7 +71,7 @@ def test_scores_gather_batches() -> None:
     log_odds = torch.randn(6, 2, 5, 5, generator=generator)
     free = (torch.rand(6, 5, 5, generator=generator) < 0.5).float()
     visible = torch.rand(6, 5, 5, generator=generator) < 0.5
-    scores = WindowScores()
+    scores = LocalPatchScores()
     scores.calibration = torch.tensor(((2.0, 0.5), (1.0, 0.0)))
     for part in (slice(0, 4), slice(4, 6)):
         scores.update(log_odds[part], free[part], visible[part])
@@ -74,4 +79,4 @@ def test_scores_gather_batches() -> None:
     torch.testing.assert_close(said[:, 0], torch.sigmoid(2 * log_odds[:, 0] + 0.5))
     found = scores.compute()
     assert found.pop("auc/sight") > 0
-    assert found == window_metrics(said[:, 0], free.bool(), visible)
+    assert found == local_patch_metrics(said[:, 0], free.bool(), visible)

@@ -1,0 +1,61 @@
+"""Scenes and observations of actor-critic agents in the training world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from omegaconf import DictConfig
+
+from avn.agents.actor_critic import ActorCriticAgent
+from avn.core.classes import build_object
+from avn.dataset.scene import Scene
+from avn.navigation.observations import SceneObservations
+from avn.navigation.scene_batch import SceneBatch, build_scene_batch
+from avn.pipeline.apartments import TRAINING, Apartments
+from avn.pipeline.audio_inference import Clips
+from avn.pipeline.observations import Observed
+from avn.pipeline.occupancy import has_occupancy_model
+from avn.pipeline.scenes import Geometry
+from avn.pipeline.sound_network import has_sound_model
+from avn.pipeline.sounds import sound_files
+from avn.pipeline.stage import Stage
+
+SUBSETS = ("train", "validation")
+
+
+def parts(cfg: DictConfig) -> dict[str, Any]:
+    """Return the arguments of an actor-critic agent that are not in its node, without network."""
+    return {
+        "hears": has_sound_model(cfg),
+        "maps": has_occupancy_model(cfg),
+        "map_size": cfg.mapper.size,
+    }
+
+
+def observed(cfg: DictConfig, subset: str) -> Observed:
+    """Return the observations of an actor-critic in a subset of the training world."""
+    given = parts(cfg)
+    names = ActorCriticAgent(hears=given["hears"], maps=given["maps"]).wants(
+        build_object("protocol", cfg.protocol)
+    )
+    clips = Clips("algorithm.realisations", "train") if subset == "train" else Clips()
+    return Observed(Apartments(cfg, subset, TRAINING), names, clips)
+
+
+def subset_stages(cfg: DictConfig, subset: str) -> list[Stage]:
+    """Return the stages of a training-world subset's geometry and observations."""
+    geometry = Geometry(cfg, Apartments(cfg, subset, TRAINING))
+    return [geometry, *observed(cfg, subset).stages.values()]
+
+
+def load_subset(cfg: DictConfig, subset: str) -> tuple[list[Scene], list[SceneObservations]]:
+    """Load the scenes of a subset of the training world and the observations in each."""
+    scenes = Geometry(cfg, Apartments(cfg, subset, TRAINING)).load()
+    return scenes, observed(cfg, subset).load(scenes)
+
+
+def tables_of(cfg: DictConfig, opened: tuple[list[Scene], list[SceneObservations]]) -> SceneBatch:
+    """Return the apartments of `load_subset` as tables, under the protocol of the config."""
+    scenes, observations = opened
+    sounds = len(sound_files(cfg, TRAINING))
+    return build_scene_batch(scenes, build_object("protocol", cfg.protocol), observations, sounds)
