@@ -23,8 +23,8 @@ from avn.apartments.local_patch import window_cells
 from avn.dataset.source_locations import relative_locations
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import exhaustive_episodes
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 from avn.planning import shortest_path
 from avn.reporting.results import summarise
@@ -49,13 +49,13 @@ STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
 COMPARED = 4
 
 
-def senses(place: DrawnPlace) -> SceneObservations:
+def senses(scene: DrawnScene) -> SceneObservations:
     """Return source estimates with an error of about a cell, and true windows."""
-    lattice = torch.from_numpy(place.grid.lattice).long()
-    where = relative_locations(lattice, torch.from_numpy(np.asarray(place.sources)).long())
+    lattice = torch.from_numpy(scene.grid.lattice).long()
+    where = relative_locations(lattice, torch.from_numpy(np.asarray(scene.sources)).long())
     generator = torch.Generator().manual_seed(0)
     sound = where + 0.7 * torch.randn(where.shape, generator=generator)
-    windows = torch.from_numpy(window_cells(place.grid) >= 0).float()
+    windows = torch.from_numpy(window_cells(scene.grid) >= 0).float()
     return SceneObservations({"source_estimate": sound[:, :, None, None]}, {"local_patch": windows})
 
 
@@ -79,15 +79,15 @@ class Timed:
         self.seconds = self.peer_seconds = 0.0
         self.plans = self.peer_plans = 0
 
-    def __call__(self, cost, walls, pose, target, aim, turn, back, running, reach):
+    def __call__(self, cost, walls, pose, target, fallback, turn, back, active, reach):
         """See `avn.planning.shortest_path.first_actions`."""
         start = time.perf_counter()
         found = shortest_path.first_actions(
-            cost, walls, pose, target, aim, turn, back, running, reach
+            cost, walls, pose, target, fallback, turn, back, active, reach
         )
         self.seconds += time.perf_counter() - start
-        self.plans += int(running.sum())
-        for n in np.flatnonzero(running)[:COMPARED]:
+        self.plans += int(active.sum())
+        for n in np.flatnonzero(active)[:COMPARED]:
             self._compare(cost[n], walls[n], pose[n], target[n], turn, reach, found[1][n])
         return found
 
@@ -112,13 +112,13 @@ class Timed:
 def main() -> None:
     """Print both rates, their ratio, and what 1,500 episodes take."""
     torch.set_num_threads(1)
-    place = draw("flat", FLAT)
-    observed = senses(place)
-    episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
+    scene = draw("flat", FLAT)
+    observed = senses(scene)
+    episodes = exhaustive_episodes(scene, ["ring"], VAR, seed=0)
     agent, labels = PlannerAgent(OccupancyMapper(41)), Labels("ours_noexp", "resonance")
-    rollout_scene(agent, place, episodes, VAR, labels, observed)  # compiles
+    rollout_scene(agent, scene, episodes, VAR, labels, observed)  # compiles
     planner_agent.first_actions = timed = Timed()
-    rollout_scene(agent, place, episodes, VAR, labels, observed)
+    rollout_scene(agent, scene, episodes, VAR, labels, observed)
     planner_agent.first_actions = shortest_path.first_actions
     own = timed.plans / timed.seconds
     peer = timed.peer_plans / timed.peer_seconds
@@ -127,7 +127,7 @@ def main() -> None:
     print(f"ratio: {own / peer:.0f} times")
     agent = PlannerAgent(OccupancyMapper())
     start = time.perf_counter()
-    frame = rollout_scene(agent, place, episodes, VAR, labels, observed)
+    frame = rollout_scene(agent, scene, episodes, VAR, labels, observed)
     summarise(frame)
     seconds = (time.perf_counter() - start) * 1500 / len(frame)
     print(f"1,500 episodes of ours_noexp with figures: {seconds:.1f} s, one thread")

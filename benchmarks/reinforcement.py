@@ -25,14 +25,14 @@ from stable_baselines3.common.vec_env import VecEnv
 from avn.apartments.local_patch import window_cells
 from avn.dataset.source_locations import relative_locations
 from avn.navigation.batched_episodes import BatchedEpisodes
+from avn.navigation.navigation_scene import draw
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import SceneBatch, build_scene_batch
 from avn.navigation.start_sampler import build_start_sampler
 from avn.rl.a3c import A3C
-from avn.rl.environment import WalkEnv
-from avn.rl.exploration_memory import draw_walks
+from avn.rl.environment import NavigationEnv
+from avn.rl.exploration_memory import draw_trajectories
 from avn.rl.networks import ActorCritic, NetworkSpec
 from avn.rl.training import Training
 from avn.rl.worker import TrainingSpec
@@ -72,26 +72,26 @@ ROWS = {
 
 def world_tables() -> tuple[list, SceneBatch]:
     """Build two copies of the flat, with random pictures and sound that encodes the location."""
-    places = [draw("one", FLAT), draw("two", FLAT)]
+    scenes = [draw("one", FLAT), draw("two", FLAT)]
     generator = torch.Generator().manual_seed(0)
     observed = []
     project = torch.randn(2, 258, generator=generator)
-    for place in places:
-        lattice = torch.from_numpy(place.grid.lattice).long()
-        where = relative_locations(lattice, torch.from_numpy(np.asarray(place.sources)).long())
+    for scene in scenes:
+        lattice = torch.from_numpy(scene.grid.lattice).long()
+        where = relative_locations(lattice, torch.from_numpy(np.asarray(scene.sources)).long())
         clips = where[:, :, None, None].expand(-1, -1, 3, 4, -1) @ project
         heard = clips + torch.randn(clips.shape, generator=generator)
         pictures = torch.randn(4 * len(lattice), 1280, generator=generator)
-        windows = torch.from_numpy(window_cells(place.grid) >= 0).float()
+        windows = torch.from_numpy(window_cells(scene.grid) >= 0).float()
         visual = {
             "visual_embedding": torch.nn.functional.normalize(pictures),
             "local_patch": windows,
         }
         observed.append(SceneObservations({"audio_embedding": heard.half()}, visual))
-    return places, build_scene_batch(places, VAR, observed)
+    return scenes, build_scene_batch(scenes, VAR, observed)
 
 
-def spec_of(row: str, places: list, tables: SceneBatch, **recipe) -> TrainingSpec:
+def spec_of(row: str, scenes: list, tables: SceneBatch, **recipe) -> TrainingSpec:
     """Build the specification of the training of a row of the table."""
     names = ROWS[row]
     both = {**tables.visual, **tables.audio}
@@ -101,9 +101,11 @@ def spec_of(row: str, places: list, tables: SceneBatch, **recipe) -> TrainingSpe
     network = ActorCritic(shape)
     for name in features:
         network.standardise(name, both[name][::7])
-    walks = draw_walks(places, tables, 32, 400, 0) if memory else None
+    trajectories = draw_trajectories(scenes, tables, 32, 400, 0) if memory else None
     given = A3C(**(RECIPE | recipe))
-    return TrainingSpec(tables, VAR, shape, given, dict(network.named_buffers()), walks=walks)
+    return TrainingSpec(
+        tables, VAR, shape, given, dict(network.named_buffers()), trajectories=trajectories
+    )
 
 
 class Ours:
@@ -111,7 +113,7 @@ class Ours:
 
     def __init__(self, spec: TrainingSpec, steps: int) -> None:
         torch.manual_seed(spec.recipe.train_seed)
-        network = ActorCritic(spec.shape)
+        network = ActorCritic(spec.network_spec)
         network.load_state_dict(spec.buffers, strict=False)
         with tempfile.TemporaryDirectory() as folder:
             measure = {"validation/spl": 0.0}
@@ -129,7 +131,7 @@ class PeerEnv(VecEnv):
         self, tables: SceneBatch, names: tuple[str, ...], seed: int, max_steps: int
     ) -> None:
         world = BatchedEpisodes(tables, build_start_sampler(tables), N, VAR, max_steps, seed=seed)
-        self.env = WalkEnv(world, names)
+        self.env = NavigationEnv(world, names)
         boxes = {
             name: gymnasium.spaces.Box(*self.env.features.range(name), value.shape[1:])
             for name, value in self._seen().items()
@@ -239,7 +241,7 @@ def peer(tables: SceneBatch, row: str, steps: int, seed: int, threads: int) -> t
 def environment(tables: SceneBatch) -> None:
     """Measure steps per second of the environment alone, with features gathered."""
     for n in (64, 256, 1024):
-        env = WalkEnv(
+        env = NavigationEnv(
             BatchedEpisodes(tables, build_start_sampler(tables), n, VAR, 200), ROWS["a3c_va"]
         )
         actions = torch.randint(4, (200, n))
@@ -259,16 +261,16 @@ def main() -> None:
     """Measure and print."""
     steps = int(sys.argv[1]) if len(sys.argv) > 1 else 200_000
     torch.set_num_threads(1)
-    places, tables = world_tables()
+    scenes, tables = world_tables()
     environment(tables)
     each = max(1, steps // 10)
     for row in ROWS:
-        spec = spec_of(row, places, tables, total_steps=steps, validate_every=each)
+        spec = spec_of(row, scenes, tables, total_steps=steps, validate_every=each)
         print(f"{row}, two workers, N={N} each: {Ours(spec, steps).rate:,.0f} steps/s")
     ours, peers = [], []
     for seed in range(3):
         options = {"total_steps": steps, "validate_every": each, "train_seed": seed}
-        ours.append(Ours(spec_of("a3c_va", places, tables, **options), steps))
+        ours.append(Ours(spec_of("a3c_va", scenes, tables, **options), steps))
         peers += [(threads, *peer(tables, "a3c_va", steps, seed, threads)) for threads in (1, 2)]
     fastest = max(rate for _, rate, _ in peers)
     rate = max(own.rate for own in ours)

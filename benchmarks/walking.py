@@ -22,13 +22,13 @@ from torch import Tensor
 from avn.agents.greedy import Greedy
 from avn.agents.oracle import Oracle
 from avn.agents.random_walk import RandomWalk
-from avn.agents.rollout import Labels, rollout_scene, walk
+from avn.agents.rollout import Labels, rollout, rollout_scene
 from avn.core.actions import BACKWARD, FORWARD, ROTATE_LEFT, ROTATE_RIGHT, transitions
 from avn.core.random import scramble
 from avn.navigation.distances import measure
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.reporting.results import summarise
@@ -138,19 +138,19 @@ def plain_walk(
     return ended
 
 
-def compare(place: DrawnPlace, episodes: Episodes) -> None:
+def compare(scene: DrawnScene, episodes: Episodes) -> None:
     """Measure both on the same episodes, see that they agree, and print."""
-    hearing = made_up_hearing(place)
-    simulator = Simulator(place, episodes, VAR, SceneObservations({"source_estimate": hearing}))
-    walk(Greedy(), simulator)
+    hearing = made_up_hearing(scene)
+    simulator = Simulator(scene, episodes, VAR, SceneObservations({"source_estimate": hearing}))
+    rollout(Greedy(), simulator)
     begin = time.perf_counter()
-    walk(Greedy(), simulator)
+    rollout(Greedy(), simulator)
     batched = time.perf_counter() - begin
 
-    distances = measure(place, VAR)
+    distances = measure(scene, VAR)
     tables = SceneBatch(
-        transitions(place.grid.neighbours).tolist(),
-        place.grid.lattice.tolist(),
+        transitions(scene.grid.neighbours).tolist(),
+        scene.grid.lattice.tolist(),
         distances.goal.tolist(),
         distances.source_moves.tolist(),
         hearing.tolist(),
@@ -171,10 +171,10 @@ def compare(place: DrawnPlace, episodes: Episodes) -> None:
     print(f"  ratio   {plain / batched:12.1f}")
 
 
-def made_up_hearing(place: DrawnPlace) -> Tensor:
+def made_up_hearing(scene: DrawnScene) -> Tensor:
     """Return the true locations with an error of 2 m, (K, S, sounds, realisations, 2)."""
-    centres = torch.from_numpy(place.grid.centres).float()
-    offset = centres[torch.from_numpy(place.sources).long()][:, None] - centres
+    centres = torch.from_numpy(scene.grid.centres).float()
+    offset = centres[torch.from_numpy(scene.sources).long()][:, None] - centres
     east, north = offset.unbind(dim=-1)
     right = torch.stack((east, -north, -east, north), dim=-1)
     front = torch.stack((north, east, -north, -east), dim=-1)
@@ -183,19 +183,19 @@ def made_up_hearing(place: DrawnPlace) -> Tensor:
     return true + 2.0 * torch.randn(shape, generator=torch.Generator().manual_seed(0))
 
 
-def rows(places: list[DrawnPlace]) -> None:
+def rows(scenes: list[DrawnScene]) -> None:
     """Measure the time of a row of the table: five rooms, three sounds, 1,500 episodes."""
     for name, agent in (("random_walk", RandomWalk()), ("greedy", Greedy()), ("oracle", Oracle())):
         begin = time.perf_counter()
         frames = []
-        for place in places:
-            episodes = frozen_episodes(place, SOUNDS, VAR, seed=0)
-            hearing = made_up_hearing(place)
+        for scene in scenes:
+            episodes = frozen_episodes(scene, SOUNDS, VAR, seed=0)
+            hearing = made_up_hearing(scene)
             labels = Labels(name, "resonance")
             frames.append(
                 rollout_scene(
                     agent,
-                    place,
+                    scene,
                     episodes,
                     VAR,
                     labels,
@@ -211,9 +211,9 @@ def rows(places: list[DrawnPlace]) -> None:
 def main() -> None:
     """Measure and print."""
     torch.set_num_threads(1)
-    place = draw("flat", FLAT)
-    compare(place, frozen_episodes(place, SOUNDS, VAR, seed=0))
-    compare(place, exhaustive_episodes(place, SOUNDS, VAR, seed=0))
+    scene = draw("flat", FLAT)
+    compare(scene, frozen_episodes(scene, SOUNDS, VAR, seed=0))
+    compare(scene, exhaustive_episodes(scene, SOUNDS, VAR, seed=0))
     rows([draw(f"flat_{number}", FLAT) for number in range(1, 6)])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"peak memory {peak:.0f} MiB, torch and pandas included")

@@ -11,14 +11,14 @@ from torch import Tensor
 from avn.agents.base import Agent
 from avn.agents.planner_agent import PlannerAgent
 from avn.agents.recorder import Recorder
-from avn.agents.rollout import Labels, records, walk
+from avn.agents.rollout import Labels, records, rollout
 from avn.apartments.local_patch import window_cells
 from avn.dataset.source_locations import relative_locations
 from avn.mapping.memory_mapper import MemoryMapper
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import frozen_episodes
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.navigation.trace import Trace
@@ -38,26 +38,26 @@ VAR = Protocol(
 TAKES = 3
 
 
-def flat() -> DrawnPlace:
+def flat() -> DrawnScene:
     return draw("flat", FLAT)
 
 
-def simulator(place: DrawnPlace, source_estimates: Tensor | None = None) -> Simulator:
+def simulator(scene: DrawnScene, source_estimates: Tensor | None = None) -> Simulator:
     """Six episodes in which the agent sees true windows.
 
     It hears the very place of the source, unless `source_estimates` says otherwise.
     """
-    lattice = torch.from_numpy(place.grid.lattice).long()
-    sources = torch.from_numpy(np.asarray(place.sources)).long()
+    lattice = torch.from_numpy(scene.grid.lattice).long()
+    sources = torch.from_numpy(np.asarray(scene.sources)).long()
     where = relative_locations(lattice, sources)[:, :, None, None].expand(-1, -1, 1, TAKES, -1)
     visual = {
-        "local_patch": torch.from_numpy(window_cells(place.grid) >= 0).float(),
-        "visual_embedding": torch.eye(4 * place.grid.cells),  # every state looks like itself alone
+        "local_patch": torch.from_numpy(window_cells(scene.grid) >= 0).float(),
+        "visual_embedding": torch.eye(4 * scene.grid.cells),  # every state looks like itself alone
     }
     observed = SceneObservations(
         {"source_estimate": where if source_estimates is None else source_estimates}, visual
     )
-    return Simulator(place, frozen_episodes(place, ["ring"], VAR, 0), VAR, observed)
+    return Simulator(scene, frozen_episodes(scene, ["ring"], VAR, 0), VAR, observed)
 
 
 def ours(explores: bool = False, localisation: str = "retrieval+odometry") -> PlannerAgent:
@@ -69,7 +69,7 @@ def walked(agent: Agent, rows: Sequence[int] = tuple(range(6))) -> list[Trace]:
     """Traces of an agent's episodes in the flat."""
     world = simulator(flat())
     recorder = Recorder({"flat": rows}, TAKES, beliefs=True)
-    walk(agent, world, recorder)
+    rollout(agent, world, recorder)
     found = records(world, Labels("ours", "resonance")).to_dict("records")
     return [recorder.trace("flat", row, found[row]) for row in rows]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.protocols import Protocol
 
 # Two rooms with a doorway (the `a` in the wall), and a source in each.
@@ -16,12 +16,12 @@ aaaaa#bbbbb
 
 
 @pytest.fixture
-def two_rooms() -> DrawnPlace:
+def two_rooms() -> DrawnScene:
     return draw("two_rooms", TWO_ROOMS)
 
 
 @pytest.fixture
-def corridor() -> DrawnPlace:
+def corridor() -> DrawnScene:
     """Eleven cells from west to east, the source on the first."""
     return draw("corridor", "A" + 10 * "a")
 

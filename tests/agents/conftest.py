@@ -3,7 +3,7 @@
 import pytest
 from small_places import corridor, protocols, two_rooms
 
-from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.protocols import Protocol
 
 __all__ = ["corridor", "flat", "hall", "protocol", "protocols", "two_rooms"]
@@ -22,12 +22,12 @@ cccc##ccccccc
 
 
 @pytest.fixture
-def flat() -> DrawnPlace:
+def flat() -> DrawnScene:
     return draw("flat", THREE_ROOMS)
 
 
 @pytest.fixture
-def hall() -> DrawnPlace:
+def hall() -> DrawnScene:
     """One empty room, so that nothing is in the way."""
     return draw("hall", "\n".join(["a" * 15] * 7 + ["a" * 7 + "A" + "a" * 7] + ["a" * 15] * 7))
 

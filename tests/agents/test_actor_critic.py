@@ -5,11 +5,11 @@ import pytest
 import torch
 
 from avn.agents.actor_critic import ActorCriticAgent
-from avn.agents.rollout import Labels, rollout_scene, walk
+from avn.agents.rollout import Labels, rollout, rollout_scene
 from avn.core.errors import UserError
 from avn.navigation.episodes import frozen_episodes
+from avn.navigation.navigation_scene import draw
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.rl.networks import ActorCritic, NetworkSpec
@@ -37,9 +37,9 @@ def make_agent(memory=0, maps=False, hears=True, **options) -> ActorCriticAgent:
     return ActorCriticAgent(network, **(given | options))
 
 
-def senses(place):
+def senses(scene):
     generator = torch.Generator().manual_seed(0)
-    states, sources = 4 * len(place.grid.lattice), len(place.sources)
+    states, sources = 4 * len(scene.grid.lattice), len(scene.sources)
     feature = torch.nn.functional.normalize(torch.randn(states, 8, generator=generator), dim=1)
     window = torch.rand(states, 5, 5, generator=generator)
     heard = torch.randn(sources, states, 2, 3, 6, generator=generator)
@@ -49,9 +49,9 @@ def senses(place):
 
 
 def records(agent, sounds=("one", "two"), rows=None):
-    place = draw("flat", FLAT)
-    episodes = frozen_episodes(place, sounds, RULES, seed=0)
-    return rollout_scene(agent, place, episodes, RULES, Labels("a3c", "resonance"), senses(place))
+    scene = draw("flat", FLAT)
+    episodes = frozen_episodes(scene, sounds, RULES, seed=0)
+    return rollout_scene(agent, scene, episodes, RULES, Labels("a3c", "resonance"), senses(scene))
 
 
 @pytest.mark.parametrize("memory", [0, 5])
@@ -59,7 +59,7 @@ def records(agent, sounds=("one", "two"), rows=None):
 def test_what_it_does_does_not_depend_on_which_episodes_are_over(memory, maps, monkeypatch):
     agent = make_agent(memory, maps)
     short = records(agent)
-    monkeypatch.setattr(ActorCriticAgent, "rest", lambda self, done: None)
+    monkeypatch.setattr(ActorCriticAgent, "set_active", lambda self, active: None)
     whole = records(agent)
     assert short.equals(whole)
     assert short["actions"].nunique() > 3  # episodes did end at different times
@@ -84,9 +84,9 @@ def test_it_wants_what_its_network_takes():
 
 
 def test_an_agent_with_memory_begins_with_what_its_walk_left_it():
-    place = draw("flat", FLAT)
-    observed = senses(place)
-    episodes = frozen_episodes(place, ("one", "two"), RULES, seed=0)
+    scene = draw("flat", FLAT)
+    observed = senses(scene)
+    episodes = frozen_episodes(scene, ("one", "two"), RULES, seed=0)
     agent = make_agent(memory=5)
     begun = []
 
@@ -97,14 +97,14 @@ def test_an_agent_with_memory_begins_with_what_its_walk_left_it():
             return super().act(observation)
 
     agent.__class__ = Watching
-    walk(agent, Simulator(place, episodes, RULES, observed))
+    rollout(agent, Simulator(scene, episodes, RULES, observed))
     h, c = agent.network.no_memory(1)
     with torch.no_grad():
-        for state in episodes.walks[0]:
+        for state in episodes.trajectories[0]:
             seen = {"visual_embedding": observed.visual["visual_embedding"][int(state)][None]}
             _, h, c = agent.network.remember(agent.network.embed(seen), h, c)
     assert torch.allclose(begun[0], h.expand_as(begun[0]), atol=1e-5)
-    assert np.all(episodes.walk == 0)
+    assert np.all(episodes.trajectory_index == 0)
 
 
 def test_without_a_network_it_cannot_act():

@@ -7,8 +7,8 @@ from avn.agents.greedy import Greedy
 from avn.agents.rollout import Labels, rollout_scene
 from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes
+from avn.navigation.navigation_scene import DrawnScene
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
 
 FORWARD, BACKWARD, LEFT, RIGHT, STOP = range(5)
@@ -26,14 +26,14 @@ def hearing(*locations: tuple[float, float]) -> TensorDict:
     )
 
 
-def true_hearing(place: DrawnPlace) -> SceneObservations:
+def true_hearing(scene: DrawnScene) -> SceneObservations:
     """The true location of each source, heard from each state, (K, S, 1, 1, 2)."""
-    centres = place.grid.centres
-    offset = centres[place.sources][:, None] - centres[None]
+    centres = scene.grid.centres
+    offset = centres[scene.sources][:, None] - centres[None]
     east, north = offset[..., 0], offset[..., 1]
     right = np.stack((east, -north, -east, north), axis=-1)
     front = np.stack((north, east, -north, -east), axis=-1)
-    table = np.stack((right, front), axis=-1).reshape(len(place.sources), -1, 1, 1, 2)
+    table = np.stack((right, front), axis=-1).reshape(len(scene.sources), -1, 1, 1, 2)
     return SceneObservations({"source_estimate": torch.from_numpy(table).float()})
 
 
@@ -62,7 +62,7 @@ def test_does_not_turn_for_ever(protocol: Protocol) -> None:
 
 
 def test_with_true_hearing_it_arrives_in_an_empty_room(
-    hall: DrawnPlace, protocol: Protocol
+    hall: DrawnScene, protocol: Protocol
 ) -> None:
     episodes = exhaustive_episodes(hall, ["ring"], protocol, seed=0)
     frame = rollout_scene(Greedy(), hall, episodes, protocol, LABELS, true_hearing(hall))
@@ -71,7 +71,7 @@ def test_with_true_hearing_it_arrives_in_an_empty_room(
     assert (frame["spl"] == 1.0).all()
 
 
-def test_it_is_blind_to_walls(flat: DrawnPlace, protocol: Protocol) -> None:
+def test_it_is_blind_to_walls(flat: DrawnScene, protocol: Protocol) -> None:
     episodes = exhaustive_episodes(flat, ["ring"], protocol, seed=0)
     frame = rollout_scene(Greedy(), flat, episodes, protocol, LABELS, true_hearing(flat))
     near, far = frame["rooms_crossed"] == 0, frame["rooms_crossed"] > 0

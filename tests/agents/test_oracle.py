@@ -3,13 +3,13 @@ import dataclasses
 from avn.agents.oracle import Oracle
 from avn.agents.rollout import Labels, rollout_scene
 from avn.navigation.episodes import exhaustive_episodes
-from avn.navigation.place import DrawnPlace
+from avn.navigation.navigation_scene import DrawnScene
 from avn.navigation.protocols import Protocol
 
 LABELS = Labels("oracle", "resonance")
 
 
-def test_oracle_is_perfect_from_every_start(flat: DrawnPlace, protocol: Protocol) -> None:
+def test_oracle_is_perfect_from_every_start(flat: DrawnScene, protocol: Protocol) -> None:
     episodes = exhaustive_episodes(flat, ["ring"], protocol, seed=0)
     frame = rollout_scene(Oracle(), flat, episodes, protocol, LABELS)
     assert len(frame) > 1000
@@ -22,7 +22,7 @@ def test_oracle_is_perfect_from_every_start(flat: DrawnPlace, protocol: Protocol
         assert (frame["softspl"] == 1.0).all()
 
 
-def test_oracle_does_not_go_round_to_save_turns(flat: DrawnPlace, protocol: Protocol) -> None:
+def test_oracle_does_not_go_round_to_save_turns(flat: DrawnScene, protocol: Protocol) -> None:
     # However wide the goal is, the walk is never longer than the shortest one to the source.
     wide = dataclasses.replace(protocol, goal="radius", radius=1.5, path_length="metres")
     episodes = exhaustive_episodes(flat, ["ring"], wide, seed=0)

@@ -14,8 +14,8 @@ from avn.dataset.source_locations import relative_locations
 from avn.mapping.memory_mapper import MemoryMapper
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import DrawnPlace, draw
 from avn.navigation.protocols import Protocol
 
 # Two rooms, a wall between them with one doorway, and a dead end on the straight way.
@@ -42,44 +42,44 @@ STOP = Protocol(
 )
 
 
-def flat() -> DrawnPlace:
+def flat() -> DrawnScene:
     return draw("flat", FLAT)
 
 
-def truth(place: DrawnPlace, protocol: Protocol = VAR) -> dict[str, Tensor]:
+def truth(scene: DrawnScene, protocol: Protocol = VAR) -> dict[str, Tensor]:
     """Hearing that tells the very place of the source, and whether it is within reach."""
-    lattice = torch.from_numpy(place.grid.lattice).long()
-    sources = torch.from_numpy(np.asarray(place.sources)).long()
-    goal = torch.from_numpy(protocol.goal_cells(place.grid, np.asarray(place.sources)))
+    lattice = torch.from_numpy(scene.grid.lattice).long()
+    sources = torch.from_numpy(np.asarray(scene.sources)).long()
+    goal = torch.from_numpy(protocol.goal_cells(scene.grid, np.asarray(scene.sources)))
     return {
         "source_estimate": relative_locations(lattice, sources)[:, :, None, None],
         "stop_probability": goal.repeat_interleave(4, dim=1)[:, :, None, None].float(),
     }
 
 
-def windows(place: DrawnPlace) -> Tensor:
+def windows(scene: DrawnScene) -> Tensor:
     """What cannot see through walls is not needed here: all cells are known."""
-    return torch.from_numpy(window_cells(place.grid) >= 0).float()
+    return torch.from_numpy(window_cells(scene.grid) >= 0).float()
 
 
-def looks(place: DrawnPlace) -> Tensor:
+def looks(scene: DrawnScene) -> Tensor:
     """Pictures that change smoothly with the place and sharply with the heading."""
-    where = torch.from_numpy(place.grid.centres).float().repeat_interleave(4, dim=0)
-    facing = torch.arange(4).repeat(len(place.grid.centres))
+    where = torch.from_numpy(scene.grid.centres).float().repeat_interleave(4, dim=0)
+    facing = torch.arange(4).repeat(len(scene.grid.centres))
     generator = torch.Generator().manual_seed(1)
     waves = torch.randn(2, 128, generator=generator) * 2
     phase = torch.rand(4, 128, generator=generator) * 6.28
     return torch.nn.functional.normalize(torch.cos(where @ waves + phase[facing]), dim=1)
 
 
-def run(agent: PlannerAgent, place: DrawnPlace, protocol: Protocol = VAR) -> pd.DataFrame:
-    seen = {"local_patch": windows(place), "visual_embedding": looks(place)}
+def run(agent: PlannerAgent, scene: DrawnScene, protocol: Protocol = VAR) -> pd.DataFrame:
+    seen = {"local_patch": windows(scene), "visual_embedding": looks(scene)}
     if agent.explores:
-        episodes = frozen_episodes(place, ["ring"], protocol, seed=0)
+        episodes = frozen_episodes(scene, ["ring"], protocol, seed=0)
     else:
-        episodes = exhaustive_episodes(place, ["ring"], protocol, seed=0)
+        episodes = exhaustive_episodes(scene, ["ring"], protocol, seed=0)
     return rollout_scene(
-        agent, place, episodes, protocol, LABELS, SceneObservations(truth(place, protocol), seen)
+        agent, scene, episodes, protocol, LABELS, SceneObservations(truth(scene, protocol), seen)
     )
 
 
@@ -136,14 +136,14 @@ def test_it_holds_to_a_source_that_it_hears_elsewhere_from_each_side() -> None:
 
 
 def test_it_finds_itself_by_retrieval_and_walks_its_memory() -> None:
-    place = flat()
+    scene = flat()
     rules = dataclasses.replace(VAR, exploration_steps=150)
-    known = run(PlannerAgent(MemoryMapper(41), collision_cost=4.0), place, rules)
+    known = run(PlannerAgent(MemoryMapper(41), collision_cost=4.0), scene, rules)
     lost = run(
-        PlannerAgent(MemoryMapper(41, localisation="retrieval"), collision_cost=4.0), place, rules
+        PlannerAgent(MemoryMapper(41, localisation="retrieval"), collision_cost=4.0), scene, rules
     )
     true = run(
-        PlannerAgent(MemoryMapper(41), collision_cost=4.0, oracle_inputs=["pose"]), place, rules
+        PlannerAgent(MemoryMapper(41), collision_cost=4.0, oracle_inputs=["pose"]), scene, rules
     )
     assert true["success"].mean() >= known["success"].mean() - 0.05
     assert known["success"].mean() > 0.6
@@ -152,32 +152,32 @@ def test_it_finds_itself_by_retrieval_and_walks_its_memory() -> None:
 
 
 def test_without_a_walk_a_memory_is_refused() -> None:
-    place, agent = flat(), PlannerAgent(MemoryMapper(41))
-    episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
+    scene, agent = flat(), PlannerAgent(MemoryMapper(41))
+    episodes = exhaustive_episodes(scene, ["ring"], VAR, seed=0)
     with pytest.raises(UserError, match="explores first, and these episodes have no exploration"):
         rollout_scene(
             agent,
-            place,
+            scene,
             episodes,
             VAR,
             LABELS,
-            SceneObservations(truth(place), {"visual_embedding": looks(place)}),
+            SceneObservations(truth(scene), {"visual_embedding": looks(scene)}),
         )
 
 
 def test_a_missing_sense_is_named() -> None:
-    place, agent = flat(), PlannerAgent(OccupancyMapper(41))
-    episodes = exhaustive_episodes(place, ["ring"], VAR, seed=0)
+    scene, agent = flat(), PlannerAgent(OccupancyMapper(41))
+    episodes = exhaustive_episodes(scene, ["ring"], VAR, seed=0)
     with pytest.raises(UserError, match="needs the observation 'local_patch', which is not there"):
-        rollout_scene(agent, place, episodes, VAR, LABELS, SceneObservations(truth(place)))
+        rollout_scene(agent, scene, episodes, VAR, LABELS, SceneObservations(truth(scene)))
     observed = SceneObservations(
-        {"source_estimate": truth(place)["source_estimate"]}, {"local_patch": windows(place)}
+        {"source_estimate": truth(scene)["source_estimate"]}, {"local_patch": windows(scene)}
     )
     with pytest.raises(
         UserError, match="needs the observation 'stop_probability', which is not there"
     ):
         rollout_scene(
-            agent, place, exhaustive_episodes(place, ["ring"], STOP, 0), STOP, LABELS, observed
+            agent, scene, exhaustive_episodes(scene, ["ring"], STOP, 0), STOP, LABELS, observed
         )
 
 

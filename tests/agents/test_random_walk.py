@@ -5,7 +5,7 @@ from tensordict import TensorDict
 from avn.agents.random_walk import RandomWalk
 from avn.agents.rollout import Labels, rollout_scene
 from avn.navigation.episodes import exhaustive_episodes
-from avn.navigation.place import DrawnPlace
+from avn.navigation.navigation_scene import DrawnScene
 from avn.navigation.protocols import Protocol
 
 NOTHING = TensorDict({}, batch_size=[10_000])
@@ -28,7 +28,7 @@ def test_same_seed_same_actions(protocol: Protocol) -> None:
     assert (draws[0] != draws[2]).any()
 
 
-def test_half_of_the_draws_are_moves(flat: DrawnPlace, protocol: Protocol) -> None:
+def test_half_of_the_draws_are_moves(flat: DrawnScene, protocol: Protocol) -> None:
     episodes = exhaustive_episodes(flat, ["ring"], protocol, seed=0)
     frame = rollout_scene(
         RandomWalk(), flat, episodes, protocol, Labels("random_walk", "resonance")

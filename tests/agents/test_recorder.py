@@ -8,7 +8,7 @@ from torch import Tensor
 from avn.agents.greedy import Greedy
 from avn.agents.random_walk import RandomWalk
 from avn.agents.recorder import Recorder
-from avn.agents.rollout import walk
+from avn.agents.rollout import rollout
 from avn.core.actions import transitions
 from avn.mapping.memory_mapper import MemoryMapper
 
@@ -16,29 +16,29 @@ from avn.mapping.memory_mapper import MemoryMapper
 def test_a_trace_is_the_walk_that_the_records_tell_of() -> None:
     for trace in walked(Greedy()):
         record, state = trace.record, trace.state
-        table = transitions(trace.place.grid.neighbours)
+        table = transitions(trace.scene.grid.neighbours)
         assert (table[state[:-1], trace.action] == state[1:]).all()
         assert (state[0] // 4, state[0] % 4) == (record["start_cell"], record["start_heading"])
         assert state[-1] // 4 == record["end_cell"]
         assert len(trace.action) == record["actions"]
         assert trace.collided.sum() == record["collisions"]
-        assert trace.goal.tolist() == trace.place.grid.centres[record["source_cell"]].tolist()
+        assert trace.goal.tolist() == trace.scene.grid.centres[record["source_cell"]].tolist()
         # Its ears are perfect here.
         assert trace.source_estimates is not None
         np.testing.assert_allclose(
             trace.source_estimates, np.tile(trace.goal, (len(state), 1)), atol=1e-5
         )
         assert trace.beliefs is None
-        assert trace.walk is None
+        assert trace.exploration_trajectory is None
 
 
 def test_the_takes_are_those_that_the_simulator_lets_hear() -> None:
-    place = flat()
+    scene = flat()
     # what is heard tells which take it is
     realisations = (
-        torch.arange(TAKES).float().expand(len(place.sources), 4 * place.grid.cells, 1, -1)
+        torch.arange(TAKES).float().expand(len(scene.sources), 4 * scene.grid.cells, 1, -1)
     )
-    world = simulator(place, torch.stack((realisations, torch.zeros_like(realisations)), dim=-1))
+    world = simulator(scene, torch.stack((realisations, torch.zeros_like(realisations)), dim=-1))
     told: list[Tensor] = []
 
     class Ears(RandomWalk):
@@ -47,7 +47,7 @@ def test_the_takes_are_those_that_the_simulator_lets_hear() -> None:
             return super().act(observation)
 
     recorder = Recorder({"flat": [1, 4]}, TAKES, beliefs=False)
-    walk(Ears(), world, recorder)
+    rollout(Ears(), world, recorder)
     for row in (1, 4):
         trace = recorder.trace("flat", row, {})
         takes = [int(step[row]) for step in told[: len(trace.action)]]
@@ -67,11 +67,11 @@ def test_beliefs_lie_where_the_apartment_lies(explores: bool, localisation: str)
         beliefs = trace.beliefs
         assert beliefs is not None
         assert beliefs.free is not None
-        squares = trace.place.grid.lattice - beliefs.low
+        squares = trace.scene.grid.lattice - beliefs.low
         free = np.zeros(beliefs.free.shape[1:], dtype=bool)
         free[squares[:, 1], squares[:, 0]] = True
         for step, belief in enumerate(beliefs.free):
-            x, y = trace.place.grid.lattice[trace.state[step] // 4] - beliefs.low
+            x, y = trace.scene.grid.lattice[trace.state[step] // 4] - beliefs.low
             if localisation != "retrieval":
                 assert belief[y, x] == 255
             if not explores:  # what it saw is true
@@ -86,11 +86,11 @@ def test_the_memory_returns_the_very_place_where_it_was_before() -> None:
     seen = 0
     for trace in walked(ours(explores=True)):
         beliefs = trace.beliefs
-        assert trace.walk is not None
+        assert trace.exploration_trajectory is not None
         assert beliefs is not None
         assert beliefs.similarity is not None
         assert beliefs.retrieved is not None
-        for step in np.flatnonzero(np.isin(trace.state[:-1], trace.walk)):
+        for step in np.flatnonzero(np.isin(trace.state[:-1], trace.exploration_trajectory)):
             assert beliefs.similarity[step, 0] == 1
             assert beliefs.retrieved[step, 0, :2].tolist() == trace.path[step].tolist()
             assert beliefs.retrieved[step, 0, 2] == trace.state[step] % 4
@@ -100,7 +100,7 @@ def test_the_memory_returns_the_very_place_where_it_was_before() -> None:
 
 def test_who_looks_on_changes_nothing_and_may_leave_early() -> None:
     watched, alone = simulator(flat()), simulator(flat())
-    walk(ours(), alone)
+    rollout(ours(), alone)
     recorder = Recorder({"flat": [0, 1]}, TAKES, beliefs=True)
     calls = 0
 
@@ -109,12 +109,12 @@ def test_who_looks_on_changes_nothing_and_may_leave_early() -> None:
         calls += 1
         return recorder(*step)  # type: ignore[arg-type]
 
-    walk(ours(), watched, watch)
+    rollout(ours(), watched, watch)
     assert (watched.state[:2] == alone.state[:2]).all()
     assert (watched.actions[:2] == alone.actions[:2]).all()
     assert calls <= int(alone.actions.max()) + 1
     other = simulator(flat())
-    walk(ours(), other, Recorder({"elsewhere": [0]}, TAKES, beliefs=True))
+    rollout(ours(), other, Recorder({"elsewhere": [0]}, TAKES, beliefs=True))
     assert not other.actions.any()
 
 

@@ -8,11 +8,11 @@ from torch import Tensor
 from avn.agents.base import Agent
 from avn.agents.greedy import Greedy
 from avn.agents.random_walk import RandomWalk
-from avn.agents.rollout import Labels, records, rollout_scene, walk
+from avn.agents.rollout import Labels, records, rollout, rollout_scene
 from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
+from avn.navigation.navigation_scene import DrawnScene
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.reporting.results import EPISODE_COLUMNS
@@ -37,7 +37,7 @@ def row_of(frame: pd.DataFrame, cell: int, heading: int) -> pd.Series:
     return frame[(frame["start_cell"] == cell) & (frame["start_heading"] == heading)].iloc[0]
 
 
-def test_records_under_var_by_hand(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_records_under_var_by_hand(corridor: DrawnScene, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
     frame = rollout_scene(Forward(), corridor, episodes, protocols["var"], LABELS)
     assert tuple(frame.columns) == EPISODE_COLUMNS
@@ -56,7 +56,7 @@ def test_records_under_var_by_hand(corridor: DrawnPlace, protocols: dict[str, Pr
     assert row_of(frame, cell=10, heading=0)["fewest_actions"] == 10
 
 
-def test_records_under_stop_by_hand(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_records_under_stop_by_hand(corridor: DrawnScene, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["stop"], seed=0)
     frame = rollout_scene(Forward(3), corridor, episodes, protocols["stop"], LABELS)
     arrived = row_of(frame, cell=4, heading=3)
@@ -74,7 +74,7 @@ def test_records_under_stop_by_hand(corridor: DrawnPlace, protocols: dict[str, P
     assert short["softspl"] == pytest.approx(1.5 / 4.0)
 
 
-def test_out_of_actions(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_out_of_actions(corridor: DrawnScene, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["stop"], seed=0)
     frame = rollout_scene(Forward(), corridor, episodes, protocols["stop"], LABELS)
     assert set(frame["outcome"]) == {"out_of_actions"}
@@ -82,7 +82,7 @@ def test_out_of_actions(corridor: DrawnPlace, protocols: dict[str, Protocol]) ->
 
 
 def test_records_name_sight_rooms_and_sounds(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring", "clock"], protocols["var"], seed=5)
     frame = rollout_scene(RandomWalk(), two_rooms, episodes, protocols["var"], LABELS)
@@ -98,7 +98,7 @@ def test_records_name_sight_rooms_and_sounds(
     assert (frame["geodesic"] >= frame["euclidean"] - 1e-9).all()
 
 
-def test_same_seed_same_records(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_same_seed_same_records(two_rooms: DrawnScene, protocols: dict[str, Protocol]) -> None:
     rules = protocols["var"]
     first, again, other = (
         rollout_scene(
@@ -126,25 +126,25 @@ class Curious(Agent):
 
 
 def test_unprivileged_agents_get_observations_alone(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring"], protocols["stop"], seed=0)
     heard = SceneObservations({"source_estimate": torch.rand(2, 204, 1, 1, 2)})
     simulator = Simulator(two_rooms, episodes, protocols["stop"], heard)
     agent = Curious()
-    walk(agent, simulator)
+    rollout(agent, simulator)
     assert set(vars(agent)) == {"given", "n", "generator", "protocol"}
     assert len(agent.given) == 500
     for given in agent.given:
         assert isinstance(given, TensorDict)
         assert set(given.keys()) == {"source_estimate", "collided", "odometry"}
     with pytest.raises(PermissionError, match="may not see the truth"):
-        agent.reveal(simulator)
+        agent.set_ground_truth(simulator)
 
 
-def renumbered(place: DrawnPlace, order: np.ndarray) -> DrawnPlace:
+def renumbered(scene: DrawnScene, order: np.ndarray) -> DrawnScene:
     """The same apartment, its cells numbered in another order: new cell i was `order[i]`."""
-    grid, back = place.grid, np.append(np.argsort(order), -1).astype(np.int32)
+    grid, back = scene.grid, np.append(np.argsort(order), -1).astype(np.int32)
     other = type(grid)(
         lattice=grid.lattice[order],
         neighbours=back[grid.neighbours[order]],
@@ -152,12 +152,12 @@ def renumbered(place: DrawnPlace, order: np.ndarray) -> DrawnPlace:
         rooms=grid.rooms[order],
         squares=grid.squares,
     )
-    return DrawnPlace(place.name, other, back[place.sources], place.in_sight[:, order])
+    return DrawnScene(scene.name, other, back[scene.sources], scene.in_sight[:, order])
 
 
 @pytest.mark.parametrize("agent", [RandomWalk(), Greedy()], ids=["random_walk", "greedy"])
 def test_agents_do_not_know_the_numbers_of_states(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol], agent: Agent
+    two_rooms: DrawnScene, protocols: dict[str, Protocol], agent: Agent
 ) -> None:
     rules = protocols["stop"]
     order = np.random.default_rng(0).permutation(51)
@@ -170,8 +170,8 @@ def test_agents_do_not_know_the_numbers_of_states(
     second = Simulator(
         other, moved, rules, SceneObservations({"source_estimate": hearing[:, states]})
     )
-    walk(agent, first)
-    walk(agent, second)
+    rollout(agent, first)
+    rollout(agent, second)
     assert (torch.from_numpy(states)[second.state] == first.state).all()
     assert (first.state != first.start).any()
     columns = ["success", "path_length", "actions", "collisions", "spl", "softspl", "sna", "dtg"]
@@ -180,7 +180,7 @@ def test_agents_do_not_know_the_numbers_of_states(
 
 
 def test_an_agent_without_what_it_needs_is_refused(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     episodes = frozen_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
     with pytest.raises(

@@ -1,5 +1,5 @@
 from avn.core.actions import BACKWARD, FORWARD, ROTATE_LEFT, ROTATE_RIGHT, STOP, transitions
-from avn.navigation.place import draw
+from avn.navigation.navigation_scene import draw
 
 
 def test_where_each_action_leads() -> None:

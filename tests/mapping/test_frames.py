@@ -11,9 +11,9 @@ def test_an_equal_picture_tells_where_the_walk_lies() -> None:
     pose = torch.tensor([[1, 2, 3]] * 4)
     place = turned(pose[:, :2], turn) + shift
     true = torch.cat((place, ((pose[:, 2] + turn) % 4)[:, None]), dim=1)
-    places = torch.stack((true, torch.randint(-5, 6, (4, 3)), torch.randint(-5, 6, (4, 3))), dim=1)
-    places[..., 2] %= 4
-    changed = votes.vote(pose, torch.tensor([[1.0, 0.8, 0.8]] * 4), places, 0.5)
+    poses = torch.stack((true, torch.randint(-5, 6, (4, 3)), torch.randint(-5, 6, (4, 3))), dim=1)
+    poses[..., 2] %= 4
+    changed = votes.vote(pose, torch.tensor([[1.0, 0.8, 0.8]] * 4), poses, 0.5)
     assert changed.all()
     found, way, known = votes.best()
     assert known.all()
@@ -23,25 +23,25 @@ def test_an_equal_picture_tells_where_the_walk_lies() -> None:
 
 def test_pictures_that_are_little_alike_decide_nothing_and_count_once() -> None:
     votes = FrameAligner(1, 41, 0.02)
-    pose, places = torch.tensor([[0, 0, 0]]), torch.tensor([[[3, 3, 0]]])
+    pose, poses = torch.tensor([[0, 0, 0]]), torch.tensor([[[3, 3, 0]]])
     for _ in range(1000):
-        votes.vote(pose, torch.tensor([[0.9]]), places, 0.5)
+        votes.vote(pose, torch.tensor([[0.9]]), poses, 0.5)
     assert not votes.best()[2].any()
 
 
 def test_a_refused_winner_never_returns_and_a_settled_one_always_wins() -> None:
     votes = FrameAligner(2, 41, 0.02)
     pose = torch.zeros(2, 3, dtype=torch.int64)
-    places = torch.tensor([[[3, 3, 0]]] * 2)
-    votes.vote(pose, torch.ones(2, 1), places, 0.5)
+    poses = torch.tensor([[[3, 3, 0]]] * 2)
+    votes.vote(pose, torch.ones(2, 1), poses, 0.5)
     assert votes.reject(torch.tensor([True, False])).tolist() == [True, False]
     for step in range(3):
-        walked, seen = pose.clone(), places.clone()
+        walked, seen = pose.clone(), poses.clone()
         walked[:, 0], seen[:, 0, 0] = step, 3 + step
         votes.vote(walked, torch.ones(2, 1), seen, 0.5)
     assert votes.best()[2].tolist() == [False, True]
-    votes.settle(torch.tensor([[1, 2], [1, 2]]), torch.tensor([3, 3]))
-    votes.vote(pose, torch.ones(2, 1), places, 0.5)
+    votes.set(torch.tensor([[1, 2], [1, 2]]), torch.tensor([3, 3]))
+    votes.vote(pose, torch.ones(2, 1), poses, 0.5)
     shift, turn, _ = votes.best()
     assert shift.tolist() == [[1, 2], [1, 2]]
     assert turn.tolist() == [3, 3]

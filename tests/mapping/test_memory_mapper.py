@@ -55,7 +55,7 @@ def test_by_retrieval_it_is_where_it_saw_the_picture(step):
     mapper = begun(localisation="retrieval", top=1)
     look(mapper, torch.eye(len(ROUND))[step], odometry=(5, 5, 1))  # which it does not look at
     assert (mapper.pose[0] - torch.tensor([CENTRE, CENTRE, 0])).tolist() == list(ROUND[step])
-    assert mapper.in_walk
+    assert mapper.in_exploration_frame
     assert set(believed(mapper)) == {(0, 0), (1, 0), (1, 1), (0, 1)}
 
 
@@ -84,10 +84,10 @@ def test_the_walk_is_laid_over_the_map_from_enough_votes_on(settings, overlaid):
     alike[3], alike[-1] = 0.98, (1 - 0.98**2) ** 0.5
     # one picture more than the walk has, so that the cosine with the fourth is 0.98
     memory = torch.nn.functional.pad(torch.eye(len(ROUND)), (0, 1))[None]
-    walks = walk_of(ROUND)
-    walks["visual_embedding"] = memory
+    trajectories = walk_of(ROUND)
+    trajectories["visual_embedding"] = memory
     mapper.reset(1, GraphRules())
-    mapper.explore(walks, torch.zeros(1, dtype=torch.int64))
+    mapper.explore(trajectories, torch.zeros(1, dtype=torch.int64))
     look(mapper, alike)
     assert (len(believed(mapper)) > 1) == overlaid
 

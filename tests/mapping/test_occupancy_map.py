@@ -27,12 +27,12 @@ def test_two_pictures_multiply_their_odds() -> None:
     start = pose((0, 0, NORTH), (0, 0, NORTH))
     window = torch.full((2, 5, 5), torch.nan)
     window[:, 0, 2] = torch.tensor([0.75, 0.2])
-    beliefs.stand(start)
-    beliefs.see(start, window)
+    beliefs.mark_visited(start)
+    beliefs.integrate(start, window)
     # The square ahead of the start, seen from the right of it facing west.
     side = pose((1, 1, WEST), (1, 1, WEST))
     window[:, 0, 2] = torch.tensor([0.8, 0.8])
-    beliefs.see(side, window)
+    beliefs.integrate(side, window)
     assert at(beliefs, 0, 0, 1) == pytest.approx(12 / 13, abs=1e-5)
     assert at(beliefs, 1, 0, 1) == pytest.approx(0.5, abs=1e-5)
 
@@ -40,9 +40,9 @@ def test_two_pictures_multiply_their_odds() -> None:
 def test_a_picture_counts_once() -> None:
     beliefs = OccupancyMap(1, 21)
     start, window = pose((0, 0, NORTH)), torch.full((1, 5, 5), 0.7)
-    beliefs.stand(start)
+    beliefs.mark_visited(start)
     for _ in range(3):
-        beliefs.see(start, window)
+        beliefs.integrate(start, window)
     assert at(beliefs, 0, 1, 3) == pytest.approx(0.7, abs=1e-5)
 
 
@@ -54,46 +54,46 @@ def test_the_window_turns_with_the_agent(heading: int, ahead_left: tuple[int, in
     beliefs = OccupancyMap(1, 21)
     window = torch.full((1, 5, 5), torch.nan)
     window[0, 0, 0] = 0.9  # nearest row, leftmost column
-    beliefs.stand(pose((0, 0, heading)))
-    beliefs.see(pose((0, 0, heading)), window)
+    beliefs.mark_visited(pose((0, 0, heading)))
+    beliefs.integrate(pose((0, 0, heading)), window)
     assert at(beliefs, 0, *ahead_left) == pytest.approx(0.9, abs=1e-5)
     assert int((beliefs.belief > 0.55).sum()) == 2  # and the agent's own square
 
 
 def test_what_was_stood_on_outweighs_pictures() -> None:
     beliefs = OccupancyMap(1, 21)
-    beliefs.stand(pose((0, 1, NORTH)))
-    beliefs.stand(pose((0, 0, NORTH)))
-    beliefs.see(pose((0, 0, NORTH)), torch.full((1, 5, 5), 0.0))
+    beliefs.mark_visited(pose((0, 1, NORTH)))
+    beliefs.mark_visited(pose((0, 0, NORTH)))
+    beliefs.integrate(pose((0, 0, NORTH)), torch.full((1, 5, 5), 0.0))
     assert at(beliefs, 0, 0, 1) > 0.999
     assert at(beliefs, 0, 1, 1) < 0.001
 
 
 def test_a_bump_blocks_the_square_or_the_way_to_a_visited_one() -> None:
     beliefs = OccupancyMap(2, 21)
-    beliefs.stand(pose((0, 1, NORTH), (5, 5, NORTH)))
-    beliefs.stand(pose((0, 0, NORTH), (0, 0, NORTH)))
+    beliefs.mark_visited(pose((0, 1, NORTH), (5, 5, NORTH)))
+    beliefs.mark_visited(pose((0, 0, NORTH), (0, 0, NORTH)))
     here = pose((0, 0, NORTH), (0, 0, NORTH))
-    beliefs.bump(here, torch.tensor([NORTH, NORTH]), torch.tensor([True, True]))
+    beliefs.mark_collision(here, torch.tensor([NORTH, NORTH]), torch.tensor([True, True]))
     middle = beliefs.centre
     assert at(beliefs, 0, 0, 1) > 0.999  # was there: it is the way that is blocked
     assert beliefs.walls[0, middle, middle] == 1 << NORTH
     assert beliefs.walls[0, middle + 1, middle] == 1 << SOUTH
     assert at(beliefs, 1, 0, 1) < 0.001
     assert not beliefs.walls[1].any()
-    beliefs.bump(here, torch.tensor([EAST, EAST]), torch.tensor([False, False]))
+    beliefs.mark_collision(here, torch.tensor([EAST, EAST]), torch.tensor([False, False]))
     assert at(beliefs, 0, 1, 0) == 0.5
 
 
 def test_pictures_at_the_border_change_nothing_outside_or_elsewhere() -> None:
     beliefs = OccupancyMap(1, 11)
     edge = pose((0, 5, NORTH))
-    beliefs.stand(edge)
+    beliefs.mark_visited(edge)
     before = beliefs.log_odds.clone()
-    beliefs.see(edge, torch.full((1, 5, 5), 0.9))
+    beliefs.integrate(edge, torch.full((1, 5, 5), 0.9))
     assert torch.equal(beliefs.log_odds, before)
     with pytest.raises(UserError, match=r"mapper.size: an agent walked off a map of 11"):
-        beliefs.stand(pose((0, 6, NORTH)))
+        beliefs.mark_visited(pose((0, 6, NORTH)))
 
 
 @pytest.mark.parametrize("size", [9, 12, -1])
@@ -116,9 +116,9 @@ def test_episodes_do_not_touch_one_another() -> None:
     windows = torch.from_numpy(rng.random((6, 20, 5, 5))).float()
     together, alone = OccupancyMap(6, 31), [OccupancyMap(1, 31) for _ in range(6)]
     for step in range(20):
-        together.stand(poses[:, step])
-        together.see(poses[:, step], windows[:, step])
+        together.mark_visited(poses[:, step])
+        together.integrate(poses[:, step], windows[:, step])
         for n, own in enumerate(alone):
-            own.stand(poses[n : n + 1, step])
-            own.see(poses[n : n + 1, step], windows[n : n + 1, step])
+            own.mark_visited(poses[n : n + 1, step])
+            own.integrate(poses[n : n + 1, step], windows[n : n + 1, step])
     torch.testing.assert_close(together.log_odds, torch.cat([own.log_odds for own in alone]))

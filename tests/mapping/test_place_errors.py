@@ -33,8 +33,8 @@ def test_a_view_that_looks_like_another_place_is_off_by_the_distance_in_metres()
 
 
 def test_each_walk_has_a_memory_of_its_own():
-    walks = torch.stack((WALK[0], WALK[0] + 8))
-    both = place_errors(LINE, UNLIKE, walks, top=1).set_index("cells")
+    trajectories = torch.stack((WALK[0], WALK[0] + 8))
+    both = place_errors(LINE, UNLIKE, trajectories, top=1).set_index("cells")
     assert both.loc["all", "views"] == 32
     # What the other walk saw is no entry of one's own.
     assert both.loc["walked", "error_m"] == 0.0

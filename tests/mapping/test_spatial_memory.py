@@ -17,23 +17,23 @@ def query(*weights: float) -> torch.Tensor:
 
 
 def test_the_place_is_the_mean_of_the_three_most_alike() -> None:
-    similarity, places = memory().recall(query(0.5, 0.6, 0.7, 0.1))
+    similarity, poses = memory().recall(query(0.5, 0.6, 0.7, 0.1))
     assert (similarity[0].diff() <= 0).all()
     # (0, 0), (2, 0) and (4, 3); two of three face heading 1.
-    assert locate(similarity, places)[0].tolist() == [2.0, 1.0, 1.0]
+    assert locate(similarity, poses)[0].tolist() == [2.0, 1.0, 1.0]
 
 
 def test_of_equal_votes_the_most_alike_has_the_heading() -> None:
-    places = torch.tensor([[[0, 0, 2], [0, 0, 0], [0, 0, 3]]])
-    assert locate(torch.tensor([[0.9, 0.8, 0.7]]), places)[0, 2] == 2
+    poses = torch.tensor([[[0, 0, 2], [0, 0, 0], [0, 0, 3]]])
+    assert locate(torch.tensor([[0.9, 0.8, 0.7]]), poses)[0, 2] == 2
 
 
 def test_it_grows_with_each_agents_own_pictures() -> None:
     both = memory(top=1)
     new = query(1.0, 1.0, 1.0, 1.0)
     both.add(new, torch.tensor([[7, 7, 2], [8, 8, 0]]), torch.tensor([True, False]))
-    similarity, places = both.recall(new)
-    assert places[0, 0].tolist() == [7, 7, 2]
+    similarity, poses = both.recall(new)
+    assert poses[0, 0].tolist() == [7, 7, 2]
     assert similarity[0, 0] == pytest.approx(1.0)
     assert similarity[1, 0] == pytest.approx(0.5)
     assert both.recall(new, own=False)[0][0, 0] == pytest.approx(0.5)
@@ -49,15 +49,15 @@ def test_fewer_entries_than_asked_for_are_averaged() -> None:
 
 def test_padding_is_no_entry() -> None:
     features = torch.nn.functional.normalize(torch.rand(2, 4, 5), dim=-1)
-    places = torch.tensor([[[0, 0, 0]] * 4, [[0, 0, 0], [1, 0, 0], [0, 0, 0], [2, 0, 0]]])
-    keys, values = distinct(features, places)
+    poses = torch.tensor([[[0, 0, 0]] * 4, [[0, 0, 0], [1, 0, 0], [0, 0, 0], [2, 0, 0]]])
+    keys, values = distinct(features, poses)
     assert keys.shape == (2, 3, 5)
     assert values[1].tolist() == [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
     assert torch.equal(keys[1], features[1, [0, 1, 3]])
     own = SpatialMemory(keys, values, torch.tensor([0]))
-    similarity, places = own.recall(-features[0, :1])
+    similarity, poses = own.recall(-features[0, :1])
     assert similarity[0].isinf().tolist() == [False, True, True]
-    assert locate(similarity, places)[0].tolist() == [0.0, 0.0, 0.0]
+    assert locate(similarity, poses)[0].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_an_empty_memory_is_refused_in_one_line() -> None:

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 import torch
-from small_worlds import make_walks, random_tables
+from small_worlds import make_trajectories, random_tables
 
 from avn.navigation.batched_episodes import BatchedEpisodes
 from avn.navigation.episodes import Episodes
-from avn.navigation.place import draw
+from avn.navigation.navigation_scene import draw
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.navigation.start_sampler import build_start_sampler
@@ -24,21 +24,21 @@ SECOND = "aaaa\naBaa\naaaA\naa.a"
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_the_world_moves_and_ends_as_the_simulator_does(flat, name):
     protocol = PROTOCOLS[name]
-    places = [draw("second", SECOND), flat]  # the second place's numbers are shifted
-    tables = random_tables(places, protocol)
+    scenes = [draw("second", SECOND), flat]  # the second place's numbers are shifted
+    tables = random_tables(scenes, protocol)
     world = BatchedEpisodes(tables, build_start_sampler(tables), 200, protocol, seed=3)
-    here = tables.source_room[world.source] == 1
-    shift, first_source = int(tables.first_state[1]), int((tables.source_room == 0).sum())
+    here = tables.source_scene[world.source] == 1
+    shift, first_source = int(tables.first_state[1]), int((tables.source_scene == 0).sum())
     episodes = Episodes(
-        room="flat",
+        scene="flat",
         seed=0,
         sounds=("one", "two"),
         number=np.arange(int(here.sum())),
         sound=world.sound[here].numpy(),
         source=world.source[here].numpy() - first_source,
         start=world.state[here].numpy() - shift,
-        walks=np.empty((0, 1), dtype=np.int64),
-        walk=np.full(int(here.sum()), -1),
+        trajectories=np.empty((0, 1), dtype=np.int64),
+        trajectory_index=np.full(int(here.sum()), -1),
     )
     simulator = Simulator(flat, episodes, protocol)
     generator = torch.Generator().manual_seed(1)
@@ -59,8 +59,8 @@ def test_the_world_moves_and_ends_as_the_simulator_does(flat, name):
 
 
 def test_rewards_are_ten_for_success_and_a_tenth_off_for_a_collision(rules):
-    place = draw("row", "aaaaaA")
-    tables = random_tables([place], rules)
+    scene = draw("row", "aaaaaA")
+    tables = random_tables([scene], rules)
     world = BatchedEpisodes(tables, build_start_sampler(tables), 3, rules, max_steps=50)
     east, north = 1, 0
     world.state = torch.tensor([4 * 2 + east, 4 * 3 + east, 4 * 3 + north])
@@ -85,7 +85,7 @@ def test_episodes_begin_everywhere_but_at_the_goal_and_equally_often(flat, rules
     starts = build_start_sampler(tables)
     source, _, state = starts.draw(60_000, torch.Generator().manual_seed(0))
     assert not tables.goal[tables.goal_row[source] + state].any()
-    assert torch.equal(tables.room[state], tables.source_room[source])
+    assert torch.equal(tables.scene[state], tables.source_scene[source])
     share = torch.bincount(source) / len(source)
     assert share.numpy() == pytest.approx(1 / len(share), abs=0.01)
     own = state[source == 0]
@@ -94,32 +94,32 @@ def test_episodes_begin_everywhere_but_at_the_goal_and_equally_often(flat, rules
 
 def test_a_start_was_not_visited_by_the_walk_of_its_episode(flat, rules):
     tables = random_tables([flat], rules)
-    walks = make_walks(tables, walks=4, steps=12)
+    trajectories = make_trajectories(tables, trajectories=4, steps=12)
     visited = torch.zeros(1, 4, tables.states, dtype=torch.bool)
-    for walk in range(4):
-        visited[0, walk, walks[0, walk]] = True
+    for trajectory_index in range(4):
+        visited[0, trajectory_index, trajectories[0, trajectory_index]] = True
     starts = build_start_sampler(tables, visited)
-    source, walk, state = starts.draw(5000, torch.Generator().manual_seed(0))
-    assert not visited[tables.source_room[source], walk, state].any()
+    source, trajectory_index, state = starts.draw(5000, torch.Generator().manual_seed(0))
+    assert not visited[tables.source_scene[source], trajectory_index, state].any()
 
 
 def test_the_clip_that_is_heard_is_that_of_source_state_sound_and_take(flat, rules):
-    places = [draw("second", SECOND), flat]
-    tables = random_tables(places, rules)
+    scenes = [draw("second", SECOND), flat]
+    tables = random_tables(scenes, rules)
     world = BatchedEpisodes(tables, build_start_sampler(tables), 64, rules, seed=2)
     generator = torch.Generator().manual_seed(0)
     hearing = []
-    for place in places:  # the very numbers of `random_tables`
-        states, sources = 4 * len(place.grid.lattice), len(place.sources)
+    for scene in scenes:  # the very numbers of `random_tables`
+        states, sources = 4 * len(scene.grid.lattice), len(scene.sources)
         hearing.append(torch.randn(sources, states, 2, 3, 6, generator=generator))
         torch.rand(states, 5, 5, generator=generator)
         torch.randn(states, 8, generator=generator)
     heard = tables.audio["audio_embedding"][world.clip()]
     for row in range(64):
-        room = int(tables.room[world.state[row]])
-        source = int(world.source[row]) - int((tables.source_room < room).sum())
-        state = int(world.state[row] - tables.first_state[room])
-        expected = hearing[room][source, state, world.sound[row], world.realisation[row]]
+        scene = int(tables.scene[world.state[row]])
+        source = int(world.source[row]) - int((tables.source_scene < scene).sum())
+        state = int(world.state[row] - tables.first_state[scene])
+        expected = hearing[scene][source, state, world.sound[row], world.realisation[row]]
         assert torch.equal(heard[row], expected)
 
 

@@ -3,7 +3,7 @@ import numpy as np
 
 from avn.core.actions import MOVES, STOP, transitions
 from avn.navigation.distances import UNREACHABLE, fewest_actions, measure
-from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.protocols import Protocol
 
 MAZE = """
@@ -15,7 +15,7 @@ aaaa##b
 """
 
 
-def test_lengths_of_the_corridor(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_lengths_of_the_corridor(corridor: DrawnScene, protocols: dict[str, Protocol]) -> None:
     var, stop = (measure(corridor, protocols[name]) for name in ("var", "stop"))
     # To the goal cells 0 and 1 in moves, and to the source in metres.
     assert var.shortest[0].tolist() == [0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
@@ -25,10 +25,10 @@ def test_lengths_of_the_corridor(corridor: DrawnPlace, protocols: dict[str, Prot
 def test_fewest_actions_agrees_with_dijkstra_over_states_and_moves_left(
     protocols: dict[str, Protocol],
 ) -> None:
-    place = draw("maze", MAZE)
-    table = transitions(place.grid.neighbours)
+    scene = draw("maze", MAZE)
+    table = transitions(scene.grid.neighbours)
     most = 12
-    goal = protocols["var"].goal_cells(place.grid, place.sources)
+    goal = protocols["var"].goal_cells(scene.grid, scene.sources)
     graph = nx.DiGraph()
     for left in range(most + 1):
         for state, nexts in enumerate(table.tolist()):
@@ -36,7 +36,7 @@ def test_fewest_actions_agrees_with_dijkstra_over_states_and_moves_left(
                 remaining = left - (action in MOVES)
                 if remaining >= 0 and after != state:
                     graph.add_edge((after, remaining), (state, left))
-    costs = fewest_actions(place.grid.neighbours, goal, most)
+    costs = fewest_actions(scene.grid.neighbours, goal, most)
     assert costs.shape == (most + 1, 2, len(table))
     for source in range(2):
         ends = {
@@ -52,7 +52,7 @@ def test_fewest_actions_agrees_with_dijkstra_over_states_and_moves_left(
                 assert min(int(costs[left, source, state]), UNREACHABLE) == wanted
 
 
-def test_turning_of_the_first_heading_counts(corridor: DrawnPlace) -> None:
+def test_turning_of_the_first_heading_counts(corridor: DrawnScene) -> None:
     goal = np.zeros((1, 11), dtype=bool)
     goal[0, 0] = True
     costs = fewest_actions(corridor.grid.neighbours, goal, 3)[3, 0, 4 * 3 : 4 * 3 + 4]
@@ -64,18 +64,18 @@ def test_crossings_take_the_shortest_walk_with_the_fewest_borders(
     protocols: dict[str, Protocol],
 ) -> None:
     # Both ways round are six moves; the northern one enters two rooms, the southern one none.
-    place = draw("ring", "abbca\na###a\nAaaaa")
-    crossings = measure(place, protocols["var"]).crossings[0]
-    corner = int(np.flatnonzero((place.grid.lattice == [4, 2]).all(axis=1))[0])
+    scene = draw("ring", "abbca\na###a\nAaaaa")
+    crossings = measure(scene, protocols["var"]).crossings[0]
+    corner = int(np.flatnonzero((scene.grid.lattice == [4, 2]).all(axis=1))[0])
     assert crossings[corner] == 0
-    by_cell = dict(zip(map(tuple, place.grid.lattice.tolist()), crossings.tolist(), strict=True))
+    by_cell = dict(zip(map(tuple, scene.grid.lattice.tolist()), crossings.tolist(), strict=True))
     assert by_cell[1, 2] == 1
     assert by_cell[2, 2] == 1
     assert by_cell[3, 2] == 2
 
 
 def test_crossings_count_each_doorway_once(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     crossings = measure(two_rooms, protocols["stop"]).crossings
     assert (

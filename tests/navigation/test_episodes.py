@@ -5,7 +5,7 @@ import pytest
 
 from avn.core.errors import UserError
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
-from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.protocols import Protocol
 
 HALL = "\n".join(["a" * 30] * 14 + ["A" + "a" * 28 + "A"])
@@ -13,14 +13,14 @@ SOUNDS = ("ring", "alarm", "clock")
 FROZEN = [180, 188, 17, 80, 187, 102, 71, 201, 202, 195, 29, 14]
 
 
-def test_frozen_list_stays_frozen(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_frozen_list_stays_frozen(two_rooms: DrawnScene, protocols: dict[str, Protocol]) -> None:
     # These very numbers are what published figures rest on: a change here changes every result.
     rules = dataclasses.replace(protocols["var"], num_starts=6)
     episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
     assert episodes.start.tolist() == FROZEN
 
 
-def test_same_starts_for_all_sounds(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_same_starts_for_all_sounds(two_rooms: DrawnScene, protocols: dict[str, Protocol]) -> None:
     episodes = frozen_episodes(two_rooms, SOUNDS, protocols["var"], seed=3)
     assert len(episodes) == 3 * 2 * 20
     by_sound = [episodes.sound == index for index in range(3)]
@@ -32,7 +32,7 @@ def test_same_starts_for_all_sounds(two_rooms: DrawnPlace, protocols: dict[str, 
 
 
 def test_seed_and_room_change_the_starts(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     first, again, other = (
         frozen_episodes(two_rooms, ["ring"], protocols["var"], seed).start for seed in (0, 0, 1)
@@ -45,7 +45,7 @@ def test_seed_and_room_change_the_starts(
 
 @pytest.mark.parametrize("name", ["var", "var_stop", "stop"])
 def test_starts_lie_outside_the_goal_and_differ(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol], name: str
+    two_rooms: DrawnScene, protocols: dict[str, Protocol], name: str
 ) -> None:
     rules = protocols[name]
     episodes = frozen_episodes(two_rooms, ["ring"], rules, seed=0)
@@ -59,9 +59,9 @@ def test_starts_lie_outside_the_one_walk_of_a_room(protocols: dict[str, Protocol
     hall = draw("hall", HALL)
     rules = dataclasses.replace(protocols["var"], exploration_steps=400)
     episodes = frozen_episodes(hall, SOUNDS, rules, seed=0)
-    assert episodes.walks.shape == (1, 401)
-    assert (episodes.walk == 0).all()
-    assert not set(episodes.start // 4) & set(episodes.walks[0] // 4)
+    assert episodes.trajectories.shape == (1, 401)
+    assert (episodes.trajectory_index == 0).all()
+    assert not set(episodes.start // 4) & set(episodes.trajectories[0] // 4)
     pairs = set(zip(episodes.source.tolist(), episodes.start.tolist(), strict=True))
     assert len(pairs) == 40
 
@@ -70,9 +70,9 @@ def test_own_walks_differ_and_leave_their_start_unexplored(protocols: dict[str, 
     hall = draw("hall", HALL)
     rules = dataclasses.replace(protocols["var"], exploration_steps=400)
     episodes = frozen_episodes(hall, SOUNDS, rules, seed=0, exploration="own")
-    assert episodes.walks.shape == (40, 401)
-    assert len(np.unique(episodes.walks, axis=0)) == 40
-    walked = episodes.walks[episodes.walk] // 4
+    assert episodes.trajectories.shape == (40, 401)
+    assert len(np.unique(episodes.trajectories, axis=0)) == 40
+    walked = episodes.trajectories[episodes.trajectory_index] // 4
     assert not (walked == (episodes.start // 4)[:, None]).any()
     goal = rules.goal_cells(hall.grid, hall.sources)
     assert not goal[episodes.source, episodes.start // 4].any()
@@ -81,7 +81,7 @@ def test_own_walks_differ_and_leave_their_start_unexplored(protocols: dict[str, 
 
 @pytest.mark.parametrize("exploration", ["shared", "own"])
 def test_a_walk_that_leaves_too_few_starts_is_cut(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol], exploration: str
+    two_rooms: DrawnScene, protocols: dict[str, Protocol], exploration: str
 ) -> None:
     # No walk of 5,000 steps leaves a cell of 51; it is cut where enough cells are left.
     rules = dataclasses.replace(protocols["var"], exploration_steps=5000)
@@ -91,21 +91,21 @@ def test_a_walk_that_leaves_too_few_starts_is_cut(
     fewest = []
     for number in range(len(episodes)):
         left = ~goal[episodes.source[number]]
-        left[episodes.walks[episodes.walk[number]] // 4] = False
+        left[episodes.trajectories[episodes.trajectory_index[number]] // 4] = False
         assert left[episodes.start[number] // 4]
         fewest.append(left.sum())
     assert min(fewest) == least
 
 
 def test_unknown_exploration_is_refused(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     with pytest.raises(UserError, match="exploration: 'none' is none of shared, own"):
         frozen_episodes(two_rooms, ["ring"], protocols["var"], 0, "none")
 
 
 def test_exhaustive_takes_every_start(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     episodes = exhaustive_episodes(two_rooms, SOUNDS, protocols["var"], seed=0)
     assert len(episodes) == 3 * 2 * (51 - 9) * 4
@@ -114,10 +114,10 @@ def test_exhaustive_takes_every_start(
 
 
 def test_too_few_starts_name_the_room(protocols: dict[str, Protocol]) -> None:
-    with pytest.raises(UserError, match=r"protocol.num_starts: room 'hut' has only 16 starts"):
+    with pytest.raises(UserError, match=r"protocol.num_starts: scene 'hut' has only 16 starts"):
         frozen_episodes(draw("hut", "Aaaaaa"), ["ring"], protocols["var"], seed=0)
 
 
-def test_keys_tell_episodes_apart(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_keys_tell_episodes_apart(two_rooms: DrawnScene, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(two_rooms, SOUNDS, protocols["var"], seed=0)
     assert len(np.unique(episodes.keys())) == len(episodes)

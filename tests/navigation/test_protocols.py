@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from avn.core.errors import UserError
-from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.protocols import Protocol
 
 
-def goals(place: DrawnPlace, protocol: Protocol) -> list[set[tuple[int, int]]]:
-    cells = protocol.goal_cells(place.grid, place.sources)
-    return [{tuple(xy) for xy in place.grid.lattice[own].tolist()} for own in cells]
+def goals(scene: DrawnScene, protocol: Protocol) -> list[set[tuple[int, int]]]:
+    cells = protocol.goal_cells(scene.grid, scene.sources)
+    return [{tuple(xy) for xy in scene.grid.lattice[own].tolist()} for own in cells]
 
 
 def test_box_is_the_nine_cells_around_the_source(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     wanted = {(x, y) for x in (8, 9, 10) for y in (1, 2, 3)}
     assert goals(two_rooms, protocols["var"])[0] == wanted
@@ -23,13 +23,13 @@ def test_box_is_the_nine_cells_around_the_source(
 
 def test_box_does_not_pass_through_walls(protocols: dict[str, Protocol]) -> None:
     # The free cell at (2, 1) touches the source at (1, 0) by a corner, and is six moves away.
-    place = draw("bend", "aaaa\na#aa\naA#a")
-    assert goals(place, protocols["var"]) == [{(1, 0), (0, 0), (0, 1)}]
-    assert goals(place, protocols["stop"]) == [{(1, 0), (0, 0), (0, 1)}]
+    scene = draw("bend", "aaaa\na#aa\naA#a")
+    assert goals(scene, protocols["var"]) == [{(1, 0), (0, 0), (0, 1)}]
+    assert goals(scene, protocols["stop"]) == [{(1, 0), (0, 0), (0, 1)}]
 
 
 def test_radius_is_measured_along_the_walk(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     within = {(x, y) for x in range(11) for y in range(5) if abs(x - 9) + abs(y - 2) <= 2}
     assert goals(two_rooms, protocols["stop"])[0] == within
@@ -62,6 +62,6 @@ def test_wrong_rules_name_their_key(key: str, value: Any) -> None:
 
 
 def test_radius_keeps_cells_that_lie_on_it() -> None:
-    place = draw("corridor", "A" + 10 * "a")
+    scene = draw("corridor", "A" + 10 * "a")
     rules = Protocol("wide", "radius", True, "metres", radius=1.5)
-    assert np.flatnonzero(rules.goal_cells(place.grid, place.sources)[0]).tolist() == [0, 1, 2, 3]
+    assert np.flatnonzero(rules.goal_cells(scene.grid, scene.sources)[0]).tolist() == [0, 1, 2, 3]

@@ -4,8 +4,8 @@ import pytest
 import torch
 
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
+from avn.navigation.navigation_scene import DrawnScene
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import DrawnPlace
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 
@@ -13,11 +13,11 @@ FORWARD, BACKWARD, LEFT, RIGHT, STOP = range(5)
 NORTH, EAST, SOUTH, WEST = range(4)
 
 
-def one(place: DrawnPlace, protocol: Protocol, cell: int, heading: int) -> Simulator:
+def one(scene: DrawnScene, protocol: Protocol, cell: int, heading: int) -> Simulator:
     """A simulator of one episode that begins at a cell and heading."""
-    every = exhaustive_episodes(place, ["ring"], protocol, seed=0)
+    every = exhaustive_episodes(scene, ["ring"], protocol, seed=0)
     return Simulator(
-        place, pick(every, (every.start == 4 * cell + heading).nonzero()[0][:1]), protocol
+        scene, pick(every, (every.start == 4 * cell + heading).nonzero()[0][:1]), protocol
     )
 
 
@@ -37,11 +37,11 @@ def act(simulator: Simulator, *actions: int) -> list[bool]:
 
 def counts(simulator: Simulator) -> tuple[int, int, int, int]:
     """Attempted and made moves, collisions, actions."""
-    numbers = (simulator.attempted, simulator.walked, simulator.collisions, simulator.actions)
+    numbers = (simulator.attempted, simulator.moves, simulator.collisions, simulator.actions)
     return tuple(int(number) for number in numbers)  # type: ignore[return-value]
 
 
-def test_var_succeeds_on_arrival(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_var_succeeds_on_arrival(corridor: DrawnScene, protocols: dict[str, Protocol]) -> None:
     simulator = one(corridor, protocols["var"], 3, WEST)
     assert act(simulator, FORWARD, FORWARD) == [False, True]
     assert simulator.success.item()
@@ -49,7 +49,7 @@ def test_var_succeeds_on_arrival(corridor: DrawnPlace, protocols: dict[str, Prot
 
 
 def test_backward_moves_against_the_heading_without_turning(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     simulator = one(corridor, protocols["var"], 4, EAST)
     observation = simulator.step(torch.tensor([BACKWARD]))
@@ -58,7 +58,7 @@ def test_backward_moves_against_the_heading_without_turning(
 
 
 def test_a_blocked_move_collides_and_stays(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     simulator = one(corridor, protocols["var"], 5, NORTH)
     assert simulator.step(torch.tensor([FORWARD]))["collided"].tolist() == [True]
@@ -68,7 +68,7 @@ def test_a_blocked_move_collides_and_stays(
 
 
 def test_var_ends_at_twice_the_moves_to_the_source_cell(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     # Three moves from the source cell, so that six may be attempted; rotations are free.
     simulator = one(corridor, protocols["var"], 3, NORTH)
@@ -79,7 +79,7 @@ def test_var_ends_at_twice_the_moves_to_the_source_cell(
 
 
 def test_arrival_with_the_last_allowed_move_succeeds(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     simulator = one(corridor, protocols["var"], 2, WEST)
     assert act(simulator, BACKWARD, BACKWARD, FORWARD, FORWARD) == [False] * 3 + [True]
@@ -91,7 +91,7 @@ def test_arrival_with_the_last_allowed_move_succeeds(
 
 @pytest.mark.parametrize("name", ["var", "var_stop", "stop"])
 def test_500_actions_of_any_kind_end_an_episode(
-    corridor: DrawnPlace, protocols: dict[str, Protocol], name: str
+    corridor: DrawnScene, protocols: dict[str, Protocol], name: str
 ) -> None:
     simulator = one(corridor, protocols[name], 5, NORTH)
     assert not any(act(simulator, *[LEFT] * 499))
@@ -99,7 +99,7 @@ def test_500_actions_of_any_kind_end_an_episode(
 
 
 def test_var_stop_wants_stop_at_the_goal(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     simulator = one(corridor, protocols["var_stop"], 2, WEST)
     assert act(simulator, FORWARD, STOP) == [False, True]
@@ -111,7 +111,7 @@ def test_var_stop_wants_stop_at_the_goal(
 
 
 def test_var_stop_keeps_the_cap_on_moves(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     simulator = one(corridor, protocols["var_stop"], 2, WEST)
     assert act(simulator, FORWARD, FORWARD, FORWARD, FORWARD) == [False] * 3 + [True]
@@ -119,7 +119,7 @@ def test_var_stop_keeps_the_cap_on_moves(
 
 
 def test_stop_succeeds_within_a_metre_and_has_no_cap_on_moves(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     simulator = one(corridor, protocols["stop"], 3, WEST)
     assert not any(act(simulator, *[FORWARD] * 40))
@@ -132,7 +132,7 @@ def test_stop_succeeds_within_a_metre_and_has_no_cap_on_moves(
 
 
 def test_a_finished_episode_stands_still(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     simulator = one(corridor, protocols["var"], 2, WEST)
     act(simulator, FORWARD, FORWARD, BACKWARD, LEFT)
@@ -146,7 +146,7 @@ def test_a_finished_episode_stands_still(
     [(NORTH, [1, 2, 1]), (EAST, [-2, 1, 0]), (SOUTH, [-1, -2, 3]), (WEST, [2, -1, 2])],
 )
 def test_odometry_is_in_the_frame_of_the_start(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol], heading: int, expected: list[int]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol], heading: int, expected: list[int]
 ) -> None:
     # Two cells north and one east, ending with the heading east.
     cell = int((two_rooms.grid.lattice == [2, 0]).all(axis=1).nonzero()[0][0])
@@ -159,7 +159,7 @@ def test_odometry_is_in_the_frame_of_the_start(
 
 
 def test_observations_hold_nothing_else(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     episodes = exhaustive_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
     silent = Simulator(two_rooms, episodes, protocols["var"])
@@ -181,7 +181,7 @@ def test_observations_hold_nothing_else(
 
 
 def test_sights_are_those_of_the_state(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     episodes = exhaustive_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
     numbers = torch.arange(204)[:, None]
@@ -204,7 +204,7 @@ def test_sights_are_those_of_the_state(
 
 
 def test_walks_are_seen_from_their_own_start(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     rules = dataclasses.replace(protocols["var"], exploration_steps=30, num_starts=4)
     episodes = frozen_episodes(two_rooms, ["ring"], rules, 0, "own")
@@ -212,17 +212,17 @@ def test_walks_are_seen_from_their_own_start(
     simulator = Simulator(
         two_rooms, episodes, rules, SceneObservations(visual={"visual_embedding": numbers})
     )
-    walks, walk = simulator.explored()
-    assert walks.batch_size == (8, 31)
-    assert walk.tolist() == list(range(8))
-    assert (walks["odometry"][:, 0] == 0).all()
-    assert (walks["visual_embedding"][..., 0].numpy() == episodes.walks).all()
-    moved = walks["odometry"][:, 1:, :2] - walks["odometry"][:, :-1, :2]
-    cells = episodes.walks // 4
+    trajectories, trajectory_index = simulator.observe_exploration()
+    assert trajectories.batch_size == (8, 31)
+    assert trajectory_index.tolist() == list(range(8))
+    assert (trajectories["odometry"][:, 0] == 0).all()
+    assert (trajectories["visual_embedding"][..., 0].numpy() == episodes.trajectories).all()
+    moved = trajectories["odometry"][:, 1:, :2] - trajectories["odometry"][:, :-1, :2]
+    cells = episodes.trajectories // 4
     assert ((moved.abs().sum(-1) == 1).numpy() == (cells[:, 1:] != cells[:, :-1])).all()
-    turned = (walks["odometry"][..., 2].numpy() + episodes.walks[:, :1]) % 4
-    assert (turned == episodes.walks % 4).all()
-    assert "source_estimate" not in set(walks.keys())
+    turned = (trajectories["odometry"][..., 2].numpy() + episodes.trajectories[:, :1]) % 4
+    assert (turned == episodes.trajectories % 4).all()
+    assert "source_estimate" not in set(trajectories.keys())
 
 
 def numbered(sounds: int, realisations: int) -> SceneObservations:
@@ -234,7 +234,7 @@ def numbered(sounds: int, realisations: int) -> SceneObservations:
 
 
 def test_hearing_is_of_the_source_the_state_and_the_sound(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     episodes = exhaustive_episodes(two_rooms, ["ring", "alarm"], protocols["var"], seed=0)
     simulator = Simulator(two_rooms, episodes, protocols["var"], numbered(2, 4))
@@ -251,7 +251,7 @@ def test_hearing_is_of_the_source_the_state_and_the_sound(
 
 
 def test_takes_do_not_depend_on_who_else_is_in_the_batch(
-    two_rooms: DrawnPlace, protocols: dict[str, Protocol]
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     rules = protocols["stop"]
     every = exhaustive_episodes(two_rooms, ["ring"], rules, seed=0)
@@ -273,7 +273,7 @@ def test_takes_do_not_depend_on_who_else_is_in_the_batch(
     assert different.float().mean() > 0.9
 
 
-def test_reset_begins_anew(two_rooms: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_reset_begins_anew(two_rooms: DrawnScene, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(two_rooms, ["ring"], protocols["var"], seed=0)
     simulator = Simulator(two_rooms, episodes, protocols["var"])
     for action in (FORWARD, LEFT, FORWARD):
@@ -285,7 +285,7 @@ def test_reset_begins_anew(two_rooms: DrawnPlace, protocols: dict[str, Protocol]
     assert not simulator.actions.any()
 
 
-def test_wrong_actions_are_refused(corridor: DrawnPlace, protocols: dict[str, Protocol]) -> None:
+def test_wrong_actions_are_refused(corridor: DrawnScene, protocols: dict[str, Protocol]) -> None:
     simulator = one(corridor, protocols["var"], 5, NORTH)
     with pytest.raises(ValueError, match="Stop is not an action under protocol 'var'"):
         simulator.step(torch.tensor([STOP]))
@@ -299,7 +299,7 @@ def test_wrong_actions_are_refused(corridor: DrawnPlace, protocols: dict[str, Pr
 
 
 def test_hearing_of_another_apartment_is_refused(
-    corridor: DrawnPlace, protocols: dict[str, Protocol]
+    corridor: DrawnScene, protocols: dict[str, Protocol]
 ) -> None:
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
     with pytest.raises(ValueError, match="audio 'source_estimate' has shape"):

@@ -54,7 +54,9 @@ def test_a_run_is_replayed_from_its_config(command, outputs, agent):
         agent not in ("greedy", "ours_noexp", "ours_exp")
     )
     assert (traces[0].beliefs is None) == (not agent.startswith("ours"))
-    assert (traces[0].walk is None) == (agent not in ("ours_exp", "a3c_va_m_mapper"))
+    assert (traces[0].exploration_trajectory is None) == (
+        agent not in ("ours_exp", "a3c_va_m_mapper")
+    )
 
 
 @pytest.mark.parametrize("row", sorted(path.stem for path in (conf_folder() / "agent").iterdir()))

@@ -42,9 +42,9 @@ def random_graphs(count: int, size: int = 9) -> tuple[np.ndarray, ...]:
 @pytest.mark.parametrize(("turn", "back"), [(0.01, np.inf), (1.0, np.inf), (1.0, 0.0), (0.5, 2.0)])
 def test_paths_are_those_of_networkx(turn: float, back: float) -> None:
     cost, walls, pose, target = random_graphs(60)
-    running = np.ones(len(cost), dtype=bool)
-    aim = target.astype(float)
-    action, length, end = first_actions(cost, walls, pose, target, aim, turn, back, running)
+    active = np.ones(len(cost), dtype=bool)
+    fallback = target.astype(float)
+    action, length, end = first_actions(cost, walls, pose, target, fallback, turn, back, active)
     unreachable = 0
     for n in range(len(cost)):
         graph = state_graph(cost[n], walls[n], turn, back)
@@ -55,10 +55,11 @@ def test_paths_are_those_of_networkx(turn: float, back: float) -> None:
             # Out of reach: the nearest node that is not.
             unreachable += 1
             away = {
-                node: (node[0] - aim[n, 0]) ** 2 + (node[1] - aim[n, 1]) ** 2 for node in lengths
+                node: (node[0] - fallback[n, 0]) ** 2 + (node[1] - fallback[n, 1]) ** 2
+                for node in lengths
             }
             nearest = min(away.values())
-            assert (end[n, 0] - aim[n, 0]) ** 2 + (end[n, 1] - aim[n, 1]) ** 2 == nearest
+            assert (end[n, 0] - fallback[n, 0]) ** 2 + (end[n, 1] - fallback[n, 1]) ** 2 == nearest
             best = min(lengths[node] for node in lengths if node[:2] == tuple(end[n]))
         else:
             assert end[n].tolist() == target[n].tolist()
@@ -77,12 +78,12 @@ def test_paths_are_those_of_networkx(turn: float, back: float) -> None:
 
 def test_who_does_not_run_gets_no_action() -> None:
     cost, walls, pose, target = random_graphs(4)
-    running = np.array([True, False, True, False])
+    active = np.array([True, False, True, False])
     action, _, end = first_actions(
-        cost, walls, pose, target, target.astype(float), 1.0, np.inf, running
+        cost, walls, pose, target, target.astype(float), 1.0, np.inf, active
     )
-    assert (action[~running] == NO_ACTION).all()
-    assert (end[~running] == pose[~running, :2]).all()
+    assert (action[~active] == NO_ACTION).all()
+    assert (end[~active] == pose[~active, :2]).all()
 
 
 def test_where_turns_are_dear_it_walks_backward() -> None:

@@ -24,13 +24,15 @@ def test_the_belief_grows_from_the_first_step_to_the_last() -> None:
 
 def test_the_memory_is_drawn_with_its_walk_and_what_it_returned() -> None:
     trace = walked(ours(explores=True), [0])[0]
-    assert trace.walk is not None
+    assert trace.exploration_trajectory is not None
     assert trace.beliefs is not None
     assert trace.beliefs.retrieved is not None
     left, right = memory_figure(trace, "ours").axes[:2]
     lines = dict(zip(*reversed(left.get_legend_handles_labels()), strict=True))
-    centres = trace.place.grid.centres
-    np.testing.assert_allclose(lines["exploration walk"].get_xydata(), centres[trace.walk // 4])
+    centres = trace.scene.grid.centres
+    np.testing.assert_allclose(
+        lines["exploration walk"].get_xydata(), centres[trace.exploration_trajectory // 4]
+    )
     np.testing.assert_allclose(
         lines["most similar entry"].get_xydata(), trace.beliefs.retrieved[:, 0, :2]
     )

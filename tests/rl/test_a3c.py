@@ -57,7 +57,7 @@ def test_returns_end_at_the_goal_and_go_on_where_an_episode_was_cut_off(flat, ru
 def test_the_loss_is_that_of_a3c(flat, rules):
     spec = make_spec(random_tables([flat], rules), rules, entropy_coef=0.02, value_coef=0.5)
     worker, batch = batch_of(spec)
-    total, figures = worker.loss(batch)
+    total, metrics = worker.loss(batch)
     network, features = worker.network, worker.env.features
     joint = trunk_outputs(network, features, batch)
     logits, value = network.actor(joint), network.critic(joint)
@@ -69,7 +69,7 @@ def test_the_loss_is_that_of_a3c(flat, rules):
     entropy = -(log_p.exp() * log_p).sum(dim=-1).mean()
     expected = -(chosen * advantage).mean() - 0.02 * entropy + 0.5 * F.mse_loss(value, target)
     assert float(total) == pytest.approx(float(expected), rel=1e-5)
-    assert figures["entropy"] == pytest.approx(float(entropy), rel=1e-5)
+    assert metrics["entropy"] == pytest.approx(float(entropy), rel=1e-5)
 
 
 @pytest.mark.parametrize("memory", [0, 3])

@@ -1,6 +1,6 @@
 import pytest
 import torch
-from small_worlds import make_spec, make_walks, make_worker, random_tables
+from small_worlds import make_spec, make_trajectories, make_worker, random_tables
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs.utils import check_env_specs
@@ -9,16 +9,16 @@ from avn.core.errors import UserError
 from avn.navigation.batched_episodes import BatchedEpisodes
 from avn.navigation.start_sampler import StartSampler, build_start_sampler
 from avn.rl.collectors import TensorCollector, TorchrlCollector
-from avn.rl.environment import WalkEnv
+from avn.rl.environment import NavigationEnv
 from avn.rl.policy import FeatureLookup, Policy
 
 ALL = ("visual_embedding", "audio_embedding", "collided", "odometry", "map")
 
 
-def make_env(tables, rules, n=6, seed=0, **options) -> WalkEnv:
+def make_env(tables, rules, n=6, seed=0, **options) -> NavigationEnv:
     observes = options.pop("observes", ALL)
     options = {"map_size": 41, "map_width": 11} | options
-    return WalkEnv(
+    return NavigationEnv(
         BatchedEpisodes(tables, build_start_sampler(tables), n, rules, 9, seed=seed),
         observes,
         **options,
@@ -52,7 +52,7 @@ def test_an_observation_that_is_not_there_is_refused_by_name(flat, rules):
 def test_only_rows_whose_episode_ended_begin_anew(flat, rules):
     env = make_env(random_tables([flat], rules), rules)
     first = env.reset()
-    env.world.actions = torch.arange(6)  # so that they are cut off one after another
+    env.episodes.actions = torch.arange(6)  # so that they are cut off one after another
     ends = 0
     for _ in range(8):
         first["action"] = torch.full((6,), 2)
@@ -110,14 +110,14 @@ def test_resolved_observations_are_those_that_the_numbers_stand_for(flat, rules)
 @pytest.mark.parametrize("maps", [0, 2])
 def test_both_collectors_give_the_same_batches(flat, rules, memory, maps):
     tables = random_tables([flat], rules)
-    walks = make_walks(tables) if memory else None
+    trajectories = make_trajectories(tables) if memory else None
     maps = min(maps, 2 if memory else 1)
     batches = []
     for collector in (TensorCollector, TorchrlCollector):
-        spec = make_spec(tables, rules, walks=walks, memory=memory, maps=maps)
+        spec = make_spec(tables, rules, trajectories=trajectories, memory=memory, maps=maps)
         worker = make_worker(spec)
         policy = Policy(worker.network, torch.Generator().manual_seed(7))
-        gathering = collector(worker.env, policy, steps=5)
+        gathering = collector(worker.env, policy, rollout_length=5)
         batches.append([gathering.collect().clone() for _ in range(6)])
     tensor, torchrl = batches
     for one, other in zip(tensor, torchrl, strict=True):
@@ -134,9 +134,9 @@ def test_the_map_is_that_of_where_the_agent_has_been_and_begins_unknown(flat, ru
         torch.nan
     )  # nothing is seen: only what it stands on and runs into
     env = make_env(tables, rules, n=1, observes=("map",))
-    east, sources = 1, len(tables.source_room)
+    east, sources = 1, len(tables.source_scene)
     begins = torch.zeros(sources, dtype=torch.int64)
-    env.world.starts = StartSampler(1, torch.tensor([4 * 2 + east]), begins, begins + 1)
+    env.episodes.starts = StartSampler(1, torch.tensor([4 * 2 + east]), begins, begins + 1)
     env.begin(torch.tensor([True]))
     assert env.observation()["map"].unique().tolist() == [0.5, 1.0]  # it stands somewhere
     env.move(torch.tensor([0]))

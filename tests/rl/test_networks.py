@@ -1,5 +1,5 @@
 import torch
-from small_worlds import make_spec, make_walks, make_worker, random_tables
+from small_worlds import make_spec, make_trajectories, make_worker, random_tables
 from tensordict import TensorDict
 from torchrl.modules import set_recurrent_mode
 
@@ -68,8 +68,8 @@ def test_unrolling_is_torchrls_recurrent_mode_with_episodes_that_begin_anew():
 
 def test_memory_crosses_steps_and_is_renewed_where_an_episode_begins_and_only_there(flat, rules):
     tables = random_tables([flat], rules)
-    walks = make_walks(tables)
-    worker = make_worker(make_spec(tables, rules, walks=walks, memory=5, max_steps=4))
+    trajectories = make_trajectories(tables)
+    worker = make_worker(make_spec(tables, rules, trajectories=trajectories, memory=5, max_steps=4))
     batch = worker.collector.collect()
     after, before = batch["h_next"][:, :-1], batch["h"][:, 1:]
     begins = batch["is_init"][:, 1:, 0]
@@ -92,10 +92,10 @@ def test_memory_of_an_agent_without_walks_begins_empty(flat, rules):
 
 def test_the_memory_after_a_walk_is_that_of_its_pictures_in_silence(flat, rules):
     tables = random_tables([flat], rules)
-    walks = make_walks(tables, walks=2, steps=7)
-    worker = make_worker(make_spec(tables, rules, walks=walks, memory=5))
+    trajectories = make_trajectories(tables, trajectories=2, steps=7)
+    worker = make_worker(make_spec(tables, rules, trajectories=trajectories, memory=5))
     h, c = worker.network.no_memory(1)
-    for state in walks[0, 1]:
+    for state in trajectories[0, 1]:
         seen = {"visual_embedding": tables.visual["visual_embedding"][state][None]}
         _, h, c = worker.network.remember(worker.network.embed(seen), h, c)
     assert torch.allclose(worker.explorations.h[1], h[0], atol=1e-6)

@@ -4,7 +4,7 @@ import time
 
 import pytest
 import torch
-from small_worlds import make_spec, make_walks, make_worker, random_tables
+from small_worlds import make_spec, make_trajectories, make_worker, random_tables
 from torch.nn import functional as F
 
 from avn.core.errors import UserError
@@ -19,11 +19,11 @@ def measure(network):
     return {"validation/spl": float(network.actor.weight.detach().sum())}
 
 
-def training(spec, folder, made_from="a" * 64) -> Training:
+def training(spec, folder, fingerprint="a" * 64) -> Training:
     torch.manual_seed(1)
-    network = ActorCritic(spec.shape)
+    network = ActorCritic(spec.network_spec)
     network.load_state_dict(spec.buffers, strict=False)
-    return Training(spec, network, folder, measure, made_from)
+    return Training(spec, network, folder, measure, fingerprint)
 
 
 def test_shared_rmsprop_is_that_of_torch():
@@ -104,10 +104,16 @@ def test_one_worker_is_synchronous_a2c_step_for_step(flat, rules, memory):
 @pytest.mark.parametrize("memory", [0, 5])
 def test_a_training_that_was_killed_goes_on_as_if_it_had_not_been(flat, rules, tmp_path, memory):
     tables = random_tables([flat], rules)
-    walks = make_walks(tables) if memory else None
+    trajectories = make_trajectories(tables) if memory else None
     maps = 2 if memory else 1
     spec = make_spec(
-        tables, rules, walks=walks, memory=memory, maps=maps, total_steps=1200, validate_every=300
+        tables,
+        rules,
+        trajectories=trajectories,
+        memory=memory,
+        maps=maps,
+        total_steps=1200,
+        validate_every=300,
     )
     whole = training(spec, tmp_path / "whole")
     whole.run()
@@ -191,12 +197,12 @@ def test_checkpoints_of_another_row_and_damaged_ones_are_refused(flat, rules, tm
     spec = make_spec(random_tables([flat], rules), rules, total_steps=60, validate_every=60)
     training(spec, tmp_path).run()
     with pytest.raises(UserError, match="of another row or recipe"):
-        training(spec, tmp_path, made_from="b" * 64)
-    network = ActorCritic(spec.shape)
+        training(spec, tmp_path, fingerprint="b" * 64)
+    network = ActorCritic(spec.network_spec)
     load_network(network, tmp_path / BEST, "a" * 64)
     other = make_spec(spec.tables, rules, inputs=("visual_embedding",))
     with pytest.raises(UserError, match="features or sizes"):
-        load_network(ActorCritic(other.shape), tmp_path / BEST, "a" * 64)
+        load_network(ActorCritic(other.network_spec), tmp_path / BEST, "a" * 64)
     (tmp_path / BEST).write_bytes(b"no checkpoint")
     with pytest.raises(UserError, match="damaged"):
         load_network(network, tmp_path / BEST, "a" * 64)
@@ -206,7 +212,7 @@ def test_the_best_on_validation_is_kept(flat, rules, tmp_path):
     spec = make_spec(random_tables([flat], rules), rules, total_steps=600, validate_every=60)
     kept = training(spec, tmp_path)
     kept.run()
-    network = ActorCritic(spec.shape)
+    network = ActorCritic(spec.network_spec)
     load_network(network, tmp_path / BEST, "a" * 64)
     best = max(own["validation/spl"] for own in kept.curve)
     assert measure(network)["validation/spl"] == pytest.approx(best)

@@ -1,0 +1,1 @@
+"""Agents, the loop that runs them in the simulator, and the records and traces of it."""

@@ -1,4 +1,4 @@
-"""Actor-critic agents: what A3C has trained, acting in the episodes of an evaluation."""
+"""Actor-critic agents: networks trained by A3C, acting in evaluation episodes."""
 
 from __future__ import annotations
 
@@ -14,35 +14,41 @@ from avn.core.errors import UserError
 from avn.mapping.ego_map import WIDTH, EgoMap, around, offsets
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.navigation.protocols import Protocol
-from avn.rl.exploration_memory import explored, with_unknown_walk
+from avn.rl.exploration_memory import explore_all, with_unknown_exploration
 from avn.rl.networks import ActorCritic, first_of
 
 
 class ActorCriticAgent(Agent):
-    """Acts with a trained actor-critic network.
+    """Agent that acts with a trained actor-critic network.
 
-    An agent with a memory explores first, in silence, and begins its episodes with what it
-    remembers of that. One that maps sees its map around it, in its heading; if it explored, it sees
-    the map of that walk beside it, at the place that the pictures of the walk tell it.
+    An agent with an LSTM explores first, without audio, and begins its episodes with the LSTM
+    state after the exploration. An agent with a map observes the part of the map around it,
+    turned to its heading. If it explored, it also observes the map of the exploration, centred
+    on its estimated pose there; a spatial memory of the exploration gives the pose.
 
     Parameters
     ----------
     network : ActorCritic or None
-        None for an agent that is only asked what it wants.
+        Trained network; None if only `wants` is used.
     width : int
-        Units of each layer of the trunk.
+        Units of each layer of the trunk, 1 or more.
     memory : int
-        Units of the LSTM; 0 for an agent that remembers nothing and does not explore.
+        Units of the LSTM; 0 for an agent without memory and exploration.
     map_width : int
-        Squares along each side of the part of the map that it sees, where there is a mapper.
+        Squares along each side of the observed part of the map, odd; used with a mapper.
     top : int
-        Entries of the spatial memory that tell where it is on the map of its walk.
+        Entries of the spatial memory that an estimate of the pose averages, 1 or more.
     samples : bool
-        Whether it draws its actions, or takes the likeliest.
+        True to sample actions from the policy, False to take the most likely action.
     hears, maps : bool
-        Whether it hears, and whether it draws a map.
+        True if the network has audio features, and a map.
     map_size : int
-        Squares along each side of its maps.
+        Squares along each side of the maps, odd.
+
+    Raises
+    ------
+    UserError
+        If `width`, `top` or `memory` is out of range.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("visual_embedding",)
@@ -66,58 +72,60 @@ class ActorCriticAgent(Agent):
         self.map_width, self.explores = map_width, memory > 0
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
-        """Features of what it sees, of what it hears, and windows for its map."""
+        """Return the names of the visual features, audio features and local patches it needs."""
         heard = ("audio_embedding",) if self.hears else ()
         return (*self.needs, *heard, *(("local_patch",) if self.maps else ()))
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
-        """Begin N new episodes, of which nothing is remembered."""
+        """Begin N new episodes with empty memories. See `Agent.reset`."""
         super().reset(n, generator, protocol)
         network = self._trained()
-        # The episodes that are worked on, by number, and those of them that go on.
-        self._rows, self._awake = torch.arange(n), torch.ones(n, dtype=torch.bool)
+        # Numbers of the episodes in the batch of the network, and which of them are not over.
+        self._rows, self._active = torch.arange(n), torch.ones(n, dtype=torch.bool)
         self._h, self._c = network.no_memory(n)
         self._map = EgoMap(n, self.map_size, self.map_width) if self.maps else None
         self._actions: Tensor | None = None
-        self._walked: OccupancyWalk | None = None
+        self._explored_map: ExploredMap | None = None
 
     @torch.no_grad()
-    def explore(self, walks: TensorDict, walk: Tensor) -> None:
-        """Work through the walks in silence, and keep memory and map."""
-        count, steps = walks.batch_size
+    def explore(self, trajectories: TensorDict, trajectory_index: Tensor) -> None:
+        """Run the network along the trajectories without audio. See `Agent.explore`."""
+        count, steps = trajectories.batch_size
         ego = EgoMap(count, self.map_size, self.map_width) if self.maps else None
 
         def inputs(step: int) -> dict[str, Tensor]:
-            own = {"visual_embedding": walks["visual_embedding"][:, step]}
+            own = {"visual_embedding": trajectories["visual_embedding"][:, step]}
             if ego is not None:
-                own["map"] = with_unknown_walk(ego.observe(walks[:, step]))
+                own["map"] = with_unknown_exploration(ego.observe(trajectories[:, step]))
             return own
 
-        h, c = explored(self._trained(), inputs, count, steps)
-        self._h, self._c = h[walk], c[walk]
+        h, c = explore_all(self._trained(), inputs, count, steps)
+        self._h, self._c = h[trajectory_index], c[trajectory_index]
         if ego is not None:
-            keys, values = distinct(walks["visual_embedding"], walks["odometry"])
-            memory = SpatialMemory(keys, values, walk, self.top)
-            self._walked = OccupancyWalk(memory, ego.map.log_odds, walk, offsets(self.map_width))
+            keys, values = distinct(trajectories["visual_embedding"], trajectories["odometry"])
+            memory = SpatialMemory(keys, values, trajectory_index, self.top)
+            self._explored_map = ExploredMap(
+                memory, ego.map.log_odds, trajectory_index, offsets(self.map_width)
+            )
 
-    def rest(self, done: Tensor) -> None:
-        """Work no more on episodes that are over, as soon as half of them are."""
-        self._awake = ~done[self._rows]
-        if 2 * int(self._awake.sum()) > len(self._rows):
+    def set_active(self, active: Tensor) -> None:
+        """Drop finished episodes from the batch as soon as half of it is finished."""
+        self._active = active[self._rows]
+        if 2 * int(self._active.sum()) > len(self._rows):
             return
-        kept = self._awake.nonzero()[:, 0]
+        kept = self._active.nonzero()[:, 0]
         self._rows, self._h, self._c = self._rows[kept], self._h[kept], self._c[kept]
         if self._actions is not None:
             self._actions = self._actions[kept]
         if self._map is not None:
             self._map.keep(kept)
-        if self._walked is not None:
-            self._walked = self._walked.keep(kept)
+        if self._explored_map is not None:
+            self._explored_map = self._explored_map.keep(kept)
 
     def act(self, observation: TensorDict) -> Tensor:
-        """One action for every episode."""
-        # drawn for all, so that what an episode draws does not depend on who is still there
-        race = torch.empty(self.n, self._trained().shape.actions)
+        """Choose an action for every episode. See `Agent.act`."""
+        # drawn for all, so that the draws of an episode do not depend on which episodes are over
+        race = torch.empty(self.n, self._trained().spec.actions)
         race.exponential_(generator=self.generator)
         actions = torch.zeros(self.n, dtype=torch.int64)
         if len(self._rows):
@@ -128,12 +136,14 @@ class ActorCriticAgent(Agent):
 
     @torch.no_grad()
     def _chosen(self, observation: TensorDict, race: Tensor) -> Tensor:
-        """Actions of the episodes that are worked on."""
+        """Choose actions for the episodes in the batch of the network."""
         network = self._trained()
-        seen = {name: observation[name] for name in network.shape.features}
+        seen = {name: observation[name] for name in network.spec.features}
         if self._map is not None:
             own = self._map.observe(observation, self._actions)
-            channels = [own] if self._walked is None else [own, self._walked.around(seen)]
+            channels = (
+                [own] if self._explored_map is None else [own, self._explored_map.around(seen)]
+            )
             seen["map"] = torch.stack(channels, dim=1)
         joint, self._h, self._c = network.remember(network.embed(seen), self._h, self._c)
         logits = network.actor(joint)
@@ -146,20 +156,32 @@ class ActorCriticAgent(Agent):
 
 
 @dataclass(frozen=True)
-class OccupancyWalk:
-    """Maps of exploration walks, and the pictures that tell where an agent is on them."""
+class ExploredMap:
+    """Maps of the exploration, with the spatial memory that localises agents on them.
+
+    Attributes
+    ----------
+    memory : SpatialMemory
+        Visual features and poses of the exploration trajectories.
+    log_odds : (W, M, M) float32 tensor
+        Maps of the trajectories; see `OccupancyMap`.
+    trajectory_index : (N,) int64 tensor
+        Trajectory of each agent.
+    squares : (4, width**2, 2) int64 tensor
+        See `avn.mapping.ego_map.offsets`.
+    """
 
     memory: SpatialMemory
     log_odds: Tensor
-    walk: Tensor
+    trajectory_index: Tensor
     squares: Tensor
 
-    def keep(self, rows: Tensor) -> OccupancyWalk:
-        """The same for some of the agents, by number."""
-        self.memory.walk = self.memory.walk[rows]
-        return replace(self, walk=self.walk[rows])
+    def keep(self, rows: Tensor) -> ExploredMap:
+        """Return the maps of the agents with the given numbers."""
+        self.memory.trajectory_index = self.memory.trajectory_index[rows]
+        return replace(self, trajectory_index=self.trajectory_index[rows])
 
     def around(self, seen: dict[str, Tensor]) -> Tensor:
-        """The map of each agent's walk around it, (N, width, width) float32."""
+        """Return the part of the map around each agent, (N, width, width) float32."""
         pose = locate(*self.memory.recall(seen["visual_embedding"], own=False)).round().long()
-        return around(self.log_odds, self.walk, pose, self.squares)
+        return around(self.log_odds, self.trajectory_index, pose, self.squares)

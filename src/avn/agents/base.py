@@ -1,4 +1,4 @@
-"""What an agent is: it moves N episodes at once, and knows what it observes and no more."""
+"""Base class of agents, which act in N episodes at once on their observations alone."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 
 
 class Agent(ABC):
-    """An agent that acts in N episodes at once.
+    """Agent that acts in N episodes at once.
 
     Attributes
     ----------
     privileged : bool
-        Whether the agent is shown the simulator before it acts; such rows are bounds and no
+        True if the agent is given the ground truth before it acts; its rows are bounds and no
         entries of the table.
     explores : bool
-        Whether it is shown the exploration walk of its episode.
+        True if the agent is given the exploration trajectory of its episode.
     needs : tuple of str
-        Observations without which it cannot act; see `wants`.
+        Names of the observations that it needs; see `wants`.
     """
 
     privileged: ClassVar[bool] = False
@@ -39,42 +39,43 @@ class Agent(ABC):
         Parameters
         ----------
         n : int
+            Number of episodes.
         generator : torch.Generator
-            Where all that the agent draws comes from.
+            Source of all random numbers of the agent.
         protocol : Protocol
-            The rules: which actions there are, and when to say Stop.
+            Actions, goal and limits of the episodes.
         """
         self.n = n
         self.generator = generator
         self.protocol = protocol
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
-        """Observations that it cannot do without under a protocol."""
+        """Return the names of the observations that it needs under a protocol."""
         return self.needs
 
     def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
-        """Settings of its own that make no difference under a protocol, by name."""
+        """Return the names of its settings that have no effect under a protocol."""
         return ()
 
-    def explore(self, walks: TensorDict, walk: Tensor) -> None:
-        """Be shown exploration walks, after `reset` and before the first action.
+    def explore(self, trajectories: TensorDict, trajectory_index: Tensor) -> None:
+        """Process the exploration trajectories, after `reset` and before the first action.
 
         Parameters
         ----------
-        walks : TensorDict of batch size (W, T)
-            What is observed at each step of each walk; odometry counts from its own start.
-        walk : (N,) int64 tensor
-            Which walk belongs to each episode.
+        trajectories : TensorDict of batch size (W, T)
+            Observations at each step of each trajectory; odometry is relative to its first state.
+        trajectory_index : (N,) int64 tensor
+            Trajectory of each episode.
         """
         return
 
-    def rest(self, done: Tensor) -> None:
-        """Be told which episodes are over, (N,) bool, to save the work of acting in them."""
+    def set_active(self, active: Tensor) -> None:
+        """Set which episodes are not over, (N,) bool, to save work on the others."""
         return
 
     @abstractmethod
     def act(self, observation: TensorDict) -> Tensor:
-        """Choose an action for every episode, finished ones included.
+        """Choose an action for every episode, including finished ones.
 
         Parameters
         ----------
@@ -84,8 +85,20 @@ class Agent(ABC):
         Returns
         -------
         (N,) int64
+            See `avn.core.actions`.
         """
 
-    def reveal(self, simulator: Simulator) -> None:
-        """Show the truth to a privileged agent, after `reset` and before it acts."""
+    def set_ground_truth(self, simulator: Simulator) -> None:
+        """Give the ground truth to a privileged agent, after `reset` and before it acts.
+
+        Parameters
+        ----------
+        simulator : Simulator
+            Holds the true map, states and sources.
+
+        Raises
+        ------
+        PermissionError
+            If the agent is not privileged.
+        """
         raise PermissionError(f"{type(self).__name__} is not privileged and may not see the truth")

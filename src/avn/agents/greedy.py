@@ -1,4 +1,4 @@
-"""Greedy search: walk towards where the source is heard, blind to walls."""
+"""Greedy agent, which moves towards the estimated source without regard to walls."""
 
 from __future__ import annotations
 
@@ -14,19 +14,24 @@ from avn.navigation.protocols import Protocol
 
 
 class Greedy(Agent):
-    """Turns to the axis with the larger part of the heard location, and walks.
+    """Agent that turns towards the estimated source and moves forward.
 
-    It listens anew after every action and knows neither walls nor where it has been. Where
-    the source is heard ahead it walks; else it turns a quarter to the side where it is heard.
+    It uses the newest source estimate alone, and keeps no map. It moves forward if the larger
+    component of the estimate points ahead, and otherwise turns a quarter towards the source.
 
     Parameters
     ----------
     slack : float
-        Metres. Where the protocol has Stop, it says so as soon as the source is heard at most that
-        far beyond where Stop succeeds; half a cell by default, since what is heard lies on no grid.
+        Tolerance of Stop, metres, 0 to 100. Under a protocol with Stop, the agent stops if the
+        estimate is at most this far beyond the goal; the default is half a cell.
     max_rotations : int
-        Quarter turns in one place, after which it walks straight on: what is heard facing one way
-        may contradict what is heard facing another, and it would turn for ever.
+        Quarter turns at one position after which it moves forward, 1 or more. The limit prevents
+        endless turning if the estimates of different headings contradict each other.
+
+    Raises
+    ------
+    UserError
+        If a setting is out of range.
     """
 
     needs = ("source_estimate",)
@@ -42,29 +47,29 @@ class Greedy(Agent):
         self.max_rotations = max_rotations
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
-        """Begin N new episodes."""
+        """Begin N new episodes. See `Agent.reset`."""
         super().reset(n, generator, protocol)
         self.turns = torch.zeros(n, dtype=torch.int64)
 
     def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
-        """Where nobody says Stop, how far beyond the goal it would."""
+        """Return `slack` under a protocol without Stop. See `Agent.unused_settings`."""
         return () if protocol.requires_stop else ("slack",)
 
     def act(self, observation: TensorDict) -> Tensor:
-        """One action for every episode, from the location heard now."""
+        """Choose an action for every episode from the newest source estimate. See `Agent.act`."""
         right, front = observation["source_estimate"].unbind(dim=-1)
         ahead = (front > 0) & (front >= right.abs())
-        walks = ahead | (self.turns >= self.max_rotations)
-        self.turns = torch.where(walks, 0, self.turns + 1)
+        forward = ahead | (self.turns >= self.max_rotations)
+        self.turns = torch.where(forward, 0, self.turns + 1)
         turn = torch.where(right < 0, ROTATE_LEFT, ROTATE_RIGHT)
-        actions = torch.where(walks, FORWARD, turn)
+        actions = torch.where(forward, FORWARD, turn)
         if self.protocol.requires_stop:
             actions = torch.where(self._within_reach(right, front), STOP, actions)
         return actions
 
     def _within_reach(self, right: Tensor, front: Tensor) -> Tensor:
-        """Whether Stop would succeed if the source were where it is heard and no wall near."""
+        """Return True if Stop would succeed with the source at the estimate, without walls."""
         if self.protocol.goal == "box":
             return torch.maximum(right.abs(), front.abs()) <= CELL + self.slack
-        # Moves go along the axes, so that a walk is as long as both parts together.
+        # Moves go along the axes, so the length of the path is the sum of both components.
         return right.abs() + front.abs() <= self.protocol.radius + self.slack

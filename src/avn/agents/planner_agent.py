@@ -1,4 +1,4 @@
-"""The paper's agent: maps what it sees, hears where the source is, and plans the way there."""
+"""The paper's agent, which maps the apartment, estimates the source and plans a path to it."""
 
 from __future__ import annotations
 
@@ -25,43 +25,54 @@ if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator
 
 LOOKS = ("once", "around")
-# Parts in whose place it can be given the truth.
+# Observations and estimates that the ground truth can replace.
 ORACLE_INPUTS = ("source_estimate", "local_patch", "map", "pose")
-# A turn costs so little where it is free that it only decides between equal walks.
+# Cost of a turn that does not count: low enough that it only decides between equal paths.
 _TIE = 0.01
 
 
 class PlannerAgent(Agent):
-    """Walks along the shortest path of its partial graph to where the source is heard.
+    """Agent that follows the shortest path of its partial graph to the estimated source.
 
-    At every step it takes the newest observation into its map, and plans anew. The target is the
-    node nearest to the heard location that it has not searched yet: where it stood and the
-    episode went on, the source is not. If the target is out of reach it goes to the node nearest to
-    the heard location that is not.
+    At every step it updates the map with the newest observation and plans again. The target is the
+    node nearest to the source estimate that it has not searched; a position is searched if the
+    agent was there and the episode went on. If the target cannot be reached, the path leads to the
+    reachable node nearest to it.
 
     Parameters
     ----------
     mapper : Mapper
+        Builds the map and localises the agent.
     look : {"once", "around"}
-        Whether it turns at each new place until it has observed all four headings there.
+        "around" turns at each new position until all four headings are observed; "once" does not.
     source_filter : {"latest", "bayes"}
-        Whether the newest estimate of the source counts alone, or all together.
-    error : HearingError
-        How far estimates are trusted, for "bayes".
-    obstacle_threshold, collision_cost : float
-        See `GraphRules`.
+        "latest" uses the newest source estimate alone; "bayes" combines all estimates.
+    error : SourceErrorModel
+        Error model of the source estimates, for "bayes".
+    obstacle_threshold : float
+        Squares whose probability of being free is below this are no nodes, 0 to 0.5.
+    collision_cost : float
+        Cost of a collision, moves, 0 to 1000: entering a square that is free with probability p
+        costs 1 + `collision_cost` (1 - p).
     backward : bool
-        Whether it may walk backward, where it sees nothing.
+        True if the agent may move backward.
     max_rotations : int
-        Quarter turns in one place after which it holds to the source as it heard it last until it
-        has moved: what is heard facing one way may contradict what is heard facing another. After
-        twice as many, and four more where it looks around, it walks straight on: where it takes
-        itself to be may contradict itself too.
+        Quarter turns at one position after which it keeps the source estimate until it has moved,
+        1 or more, since estimates of different headings may contradict each other. After twice as
+        many, and four more with "around", it moves forward, since pose estimates may also
+        contradict each other.
     stop_at : float
-        Where the protocol has Stop, the probability of being within reach from which it says so.
+        Probability of being at the goal from which the agent stops, 0 to 1; for protocols with
+        Stop.
     oracle_inputs : sequence of str
-        Parts in whose place it is given the truth, which makes it privileged: `source_estimate` and
-        `local_patch` come with the observations, `map` and `pose` go to the mapper.
+        Inputs that the ground truth replaces, which makes the agent privileged:
+        `source_estimate`, `local_patch`, `map` and `pose`. `map` and `pose` are set in the mapper,
+        the others come with the observations.
+
+    Raises
+    ------
+    UserError
+        If a setting is out of range, or the mapper has no use for an oracle input.
     """
 
     def __init__(
@@ -82,7 +93,7 @@ class PlannerAgent(Agent):
                 raise UserError(
                     f"agent.oracle_inputs: '{part}' is none of {', '.join(ORACLE_INPUTS)}"
                 )
-            if part in ("map", "pose") and part not in mapper.reveals:
+            if part in ("map", "pose") and part not in mapper.ground_truths:
                 raise UserError(
                     f"agent.oracle_inputs: '{part}' is nothing that {type(mapper).__name__} can be "
                     "shown"
@@ -102,45 +113,45 @@ class PlannerAgent(Agent):
         self.needs = ("source_estimate", *mapper.needs)  # type: ignore[misc]
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
-        """What it has to observe; where it has to say Stop, whether it is within reach."""
+        """Return the observations it needs, with `stop_probability` if the protocol has Stop."""
         return (*self.needs, "stop_probability") if protocol.requires_stop else self.needs
 
     def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
-        """Where the newest estimate counts alone, how far estimates are trusted."""
+        """Return `error` for the filter "latest". See `Agent.unused_settings`."""
         return ("error",) if self.source_filter == "latest" else ()
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
-        """Begin N new episodes."""
+        """Begin N new episodes. See `Agent.reset`."""
         super().reset(n, generator, protocol)
         self.mapper.reset(n, self.rules)
-        self._search: SourceBelief | None = None
-        # An episode without Stop ends in the cells round the source already.
+        self._source_belief: SourceBelief | None = None
+        # Without Stop an episode also ends in the cells around the source.
         self._near = 1 if protocol.goal == "box" and not protocol.requires_stop else 0
-        self._running = np.ones(n, dtype=np.bool_)
-        self._way = torch.full((n,), -1)
+        self._active = np.ones(n, dtype=np.bool_)
+        self._direction = torch.full((n,), -1)
         self._turns = torch.zeros(n, dtype=torch.int64)
         self._looked = torch.zeros(n, 0, dtype=torch.int64)
 
-    def reveal(self, simulator: Simulator) -> None:
-        """Show the mapper what it is given of the truth."""
+    def set_ground_truth(self, simulator: Simulator) -> None:
+        """Give the mapper the true map and pose, if chosen. See `Agent.set_ground_truth`."""
         for part in ("map", "pose"):
             if part in self.oracle_inputs:
-                self.mapper.reveal(part, simulator)
+                self.mapper.set_ground_truth(part, simulator)
 
-    def explore(self, walks: TensorDict, walk: Tensor) -> None:
-        """Remember exploration walks; see `Mapper.explore`."""
-        self.mapper.explore(walks, walk)
+    def explore(self, trajectories: TensorDict, trajectory_index: Tensor) -> None:
+        """Give the mapper the exploration trajectories. See `Agent.explore`."""
+        self.mapper.explore(trajectories, trajectory_index)
 
-    def rest(self, done: Tensor) -> None:
-        """Plan no more for episodes that are over."""
-        self._running = ~done.numpy()
-        self.mapper.rest(done)
+    def set_active(self, active: Tensor) -> None:
+        """Set which episodes are planned for. See `Agent.set_active`."""
+        self._active = active.numpy()
+        self.mapper.set_active(active)
 
     def act(self, observation: TensorDict) -> Tensor:
-        """One action for every episode, along the path planned now."""
-        self.mapper.observe(observation, self._way)
-        self._listen(observation["source_estimate"], self._running)
-        actions = self._planned(self._running)
+        """Choose an action for every episode along the newest path. See `Agent.act`."""
+        self.mapper.observe(observation, self._direction)
+        self._update_source(observation["source_estimate"], self._active)
+        actions = self._planned(self._active)
         spins = self._turns >= 2 * self.max_rotations
         if self.look == "around":
             actions = torch.where(self._all_seen(), actions, ROTATE_RIGHT)
@@ -148,30 +159,34 @@ class PlannerAgent(Agent):
         actions = torch.where(spins, FORWARD, actions)
         if self.protocol.requires_stop:
             actions = torch.where(observation["stop_probability"] >= self.stop_at, STOP, actions)
-        self._way = torch.where(actions == FORWARD, 0, torch.where(actions == BACKWARD, 2, -1))
-        self._turns = torch.where(self._way >= 0, 0, self._turns + 1)
+        self._direction = torch.where(
+            actions == FORWARD, 0, torch.where(actions == BACKWARD, 2, -1)
+        )
+        self._turns = torch.where(self._direction >= 0, 0, self._turns + 1)
         return actions
 
-    def _listen(self, sound: Tensor, running: np.ndarray) -> None:
-        """Turn what is heard into places on the map."""
+    def _update_source(self, estimate: Tensor, active: np.ndarray) -> None:
+        """Update the belief of the source with the newest estimates, in the frame of the map."""
         pose, graph = self.mapper.pose, self.mapper.graph
-        if self._search is None:
-            self._search = SourceBelief(self.n, graph.cost.shape[1], self.source_filter, self.error)
-        place, heard = pose[:, :2].numpy(), sound.double() / CELL
-        aim = self.mapper.location + turned(heard, pose[:, 2])
-        behind = turned(heard * heard.new_tensor((1.0, -1.0)), pose[:, 2])
-        mirrored = self.mapper.location + behind
-        listens = running & (self._turns < self.max_rotations).numpy()
-        self._search.listen(place, aim.numpy(), mirrored.numpy(), listens)
-        # Where no Stop is needed, an episode that goes on tells that none of the cells around
-        # holds the source; where it is, that the place itself does not.
-        self._search.rule_out(place, self._near, running)
+        if self._source_belief is None:
+            self._source_belief = SourceBelief(
+                self.n, graph.cost.shape[1], self.source_filter, self.error
+            )
+        position, offset = pose[:, :2].numpy(), estimate.double() / CELL
+        source_estimate = self.mapper.location + turned(offset, pose[:, 2])
+        behind = turned(offset * offset.new_tensor((1.0, -1.0)), pose[:, 2])
+        mirror_image = self.mapper.location + behind
+        updated = active & (self._turns < self.max_rotations).numpy()
+        self._source_belief.update(position, source_estimate.numpy(), mirror_image.numpy(), updated)
+        # An episode without Stop that goes on has no source in the cells around the agent; one
+        # with Stop has none in the agent's own cell.
+        self._source_belief.rule_out(position, self._near, active)
 
-    def _planned(self, running: np.ndarray) -> Tensor:
-        """The first action of the shortest path; a turn where there is no path to walk."""
-        assert self._search is not None
-        graph, search = self.mapper.graph, self._search
-        target = search.targets(graph.cost, running)
+    def _planned(self, active: np.ndarray) -> Tensor:
+        """Return the first action of the shortest path, and a turn if there is none."""
+        assert self._source_belief is not None
+        graph, source_belief = self.mapper.graph, self._source_belief
+        target = source_belief.targets(graph.cost, active)
         action, _, _ = first_actions(
             graph.cost,
             graph.walls,
@@ -180,17 +195,17 @@ class PlannerAgent(Agent):
             target.astype(np.float64),
             1.0 if self.protocol.counts_turns else _TIE,
             0.0 if self.backward else np.inf,
-            running,
+            active,
             self._near,
         )
         return torch.from_numpy(np.where(action == NO_ACTION, ROTATE_RIGHT, action))
 
     def _all_seen(self) -> Tensor:
-        """Whether all four headings were observed at the place where each agent is."""
+        """Return True if all four headings were observed at the agent's position, (N,) bool."""
         size, pose = self.mapper.graph.cost.shape[1], self.mapper.pose
         if not self._looked.shape[1]:
             self._looked = torch.zeros(self.n, size * size, dtype=torch.int64)
-        place = (pose[:, 1] * size + pose[:, 0])[:, None]
-        seen = self._looked.gather(1, place) | 1 << pose[:, 2:]
-        self._looked.scatter_(1, place, seen)
+        position = (pose[:, 1] * size + pose[:, 0])[:, None]
+        seen = self._looked.gather(1, position) | 1 << pose[:, 2:]
+        self._looked.scatter_(1, position, seen)
         return seen[:, 0] == (1 << HEADINGS) - 1

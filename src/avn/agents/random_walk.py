@@ -1,4 +1,4 @@
-"""Random walk: any of the protocol's actions, all with the same chance."""
+"""Random agent, which draws actions uniformly."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from avn.agents.base import Agent
 
 
 class RandomWalk(Agent):
-    """Draws uniformly from all actions of the protocol; Stop is one of them where there is one."""
+    """Agent that draws uniformly from all actions of the protocol, including Stop if it has one."""
 
     def act(self, observation: TensorDict) -> Tensor:
-        """One draw for every episode."""
+        """Draw an action for every episode. See `Agent.act`."""
         return torch.randint(self.protocol.actions, (self.n,), generator=self.generator)

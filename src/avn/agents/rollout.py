@@ -1,4 +1,4 @@
-"""The loop in which an agent walks all episodes of a room, and the records it leaves."""
+"""Rollouts of an agent in the simulator, and the records of its episodes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,29 @@ from avn.core.random import derive
 from avn.navigation.distances import fewest_actions
 from avn.navigation.episodes import Episodes
 from avn.navigation.metrics import sna, soft_spl, spl
+from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 
-# What looks on at a walk: it is shown simulator and agent, what is observed, and the actions that
-# follow, which are None when all episodes are over; it says whether it has seen enough.
+# Callback of a rollout. Its arguments are the simulator, the agent, the observation and the actions
+# that follow, which are None after the last step. The rollout ends if it returns True.
 Watch = Callable[[Simulator, Agent, TensorDict, Tensor | None], bool]
 
 
 @dataclass(frozen=True)
 class Labels:
-    """What the records say of a run beside what the simulator knows."""
+    """Values of the records that the simulator does not know.
+
+    Attributes
+    ----------
+    agent : str
+        Name of the agent.
+    acoustics : str
+        Name of the acoustics.
+    look : {"once", "around"}
+        See `PlannerAgent`.
+    """
 
     agent: str
     acoustics: str
@@ -40,46 +50,69 @@ class Labels:
 
 def rollout_scene(
     agent: Agent,
-    place: Place,
+    scene: NavigationScene,
     episodes: Episodes,
     protocol: Protocol,
     labels: Labels,
     observations: SceneObservations | None = None,
     watch: Watch | None = None,
 ) -> pd.DataFrame:
-    """Let an agent walk all episodes of a room at once.
+    """Run an agent in all episodes of a scene at once.
 
-    What the agent draws comes from the episodes' seed and the room, so that the same call gives
-    the same records.
+    The random numbers of the agent are a function of the episodes' seed and the scene, so equal
+    calls give equal records.
 
     Parameters
     ----------
+    agent : Agent
+        Acts in the episodes.
+    scene : NavigationScene
+        Apartment of the episodes.
+    episodes : Episodes
+        Sound, source and start of each episode.
+    protocol : Protocol
+        Actions, goal and limits of an episode.
+    labels : Labels
+        Values of the records that the simulator does not know.
     observations : SceneObservations, optional
-        What can be heard and seen there.
+        Audio and visual observations of the scene.
     watch : callable, optional
-        Looks on; see `Watch`. When it has seen enough the walk is broken off, and what the records
-        say of episodes that still run is void.
+        Called at each step; see `Watch`. If it ends the rollout early, the records of unfinished
+        episodes are not valid.
 
     Returns
     -------
     DataFrame
-        One row an episode; the columns are `avn.reporting.results.EPISODE_COLUMNS`.
+        One row for each episode, with the columns `avn.reporting.results.EPISODE_COLUMNS`.
 
     Raises
     ------
     UserError
-        Where the agent needs an observation that is not there.
+        If an observation or the exploration that the agent needs is missing.
     """
-    simulator = Simulator(place, episodes, protocol, observations)
-    walk(agent, simulator, watch)
+    simulator = Simulator(scene, episodes, protocol, observations)
+    rollout(agent, simulator, watch)
     return records(simulator, labels)
 
 
-def walk(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> None:
+def rollout(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> None:
     """Run all episodes of a simulator to their end.
 
-    An agent gets observations and nothing else; only one that says it is privileged is shown the
-    simulator.
+    The agent gets observations alone; a privileged agent is also given the simulator.
+
+    Parameters
+    ----------
+    agent : Agent
+        Acts in the episodes.
+    simulator : Simulator
+        Reset before the first action.
+    watch : callable, optional
+        Called at each step; see `Watch`.
+
+    Raises
+    ------
+    UserError
+        If an observation or the exploration that the agent needs is missing.
     """
     observation = simulator.reset()
     for key in sorted(set(agent.wants(simulator.protocol)) - set(observation.keys())):
@@ -88,38 +121,38 @@ def walk(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> None
             f"there are {', '.join(sorted(observation.keys()))}"
         )
     episodes = simulator.episodes
-    generator = torch.Generator().manual_seed(derive("agent", episodes.seed, episodes.room) >> 1)
+    generator = torch.Generator().manual_seed(derive("agent", episodes.seed, episodes.scene) >> 1)
     agent.reset(len(simulator), generator, simulator.protocol)
     if agent.explores:
-        if not len(episodes.walks):
+        if not len(episodes.trajectories):
             raise UserError(
                 f"episodes: agent {type(agent).__name__} explores first, and these episodes have "
                 "no exploration walk; take episodes=frozen and protocol.exploration_steps=400"
             )
-        agent.explore(*simulator.explored())
+        agent.explore(*simulator.observe_exploration())
     if agent.privileged:
-        agent.reveal(simulator)
+        agent.set_ground_truth(simulator)
     with torch.inference_mode():
         while not bool(simulator.done.all()):
             actions = agent.act(observation)
             if watch and watch(simulator, agent, observation, actions):
                 return
             observation = simulator.step(actions)
-            agent.rest(simulator.done)
+            agent.set_active(~simulator.done)
     if watch:
         watch(simulator, agent, observation, None)
 
 
 def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
-    """One row for each episode of a simulator that has run to its end."""
-    place, episodes, protocol = simulator.place, simulator.episodes, simulator.protocol
+    """Tabulate the episodes of a simulator that has run to its end, one row for each."""
+    scene, episodes, protocol = simulator.scene, simulator.episodes, simulator.protocol
     distances = simulator.distances
     source, start = episodes.source, episodes.start // HEADINGS
     end = simulator.state.numpy() // HEADINGS
-    centres = place.grid.centres
-    walked = CELL * simulator.walked.numpy().astype(np.float64)
+    centres = scene.grid.centres
+    metres = CELL * simulator.moves.numpy().astype(np.float64)
     path = (
-        walked
+        metres
         if protocol.path_length == "metres"
         else simulator.attempted.numpy().astype(np.float64)
     )
@@ -133,17 +166,17 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
             "acoustics": labels.acoustics,
             "look": labels.look,
             "sound": np.array(episodes.sounds, dtype=object)[episodes.sound],
-            "scene": place.name,
+            "scene": scene.name,
             "seed": episodes.seed,
             "episode": episodes.number,
             "start_cell": start,
             "start_heading": episodes.start % HEADINGS,
             "source": source,
-            "source_cell": np.asarray(place.sources)[source],
-            "in_sight": place.in_sight[source, start].astype(np.int64),
+            "source_cell": np.asarray(scene.sources)[source],
+            "in_sight": scene.in_sight[source, start].astype(np.int64),
             "rooms_crossed": distances.crossings[source, start],
             "geodesic": CELL * distances.source_moves[source, start],
-            "euclidean": np.hypot(*(centres[start] - centres[np.asarray(place.sources)[source]]).T),
+            "euclidean": np.hypot(*(centres[start] - centres[np.asarray(scene.sources)[source]]).T),
             "end_cell": end,
             "path_length": path,
             "shortest": shortest,
@@ -161,17 +194,17 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
 
 
 def _fewest(simulator: Simulator) -> np.ndarray:
-    """Fewest actions that succeed on a walk with p <= l, Stop included, (N,)."""
+    """Return the fewest actions that succeed on a path with p <= l, including Stop, (N,)."""
     episodes, distances = simulator.episodes, simulator.distances
     allowance = distances.allowance[episodes.source, episodes.start // HEADINGS]
-    neighbours = simulator.place.grid.neighbours
+    neighbours = simulator.scene.grid.neighbours
     costs = fewest_actions(neighbours, distances.goal, int(allowance.max()))
     own = costs[allowance, episodes.source, episodes.start].astype(np.int64)
     return own + int(simulator.protocol.requires_stop)
 
 
 def _outcome(simulator: Simulator) -> np.ndarray:
-    """How each episode ended, in a word."""
+    """Return the outcome of each episode, a word, (N,)."""
     out_of_moves = simulator.attempted >= simulator.max_attempts
     cases = [simulator.success, simulator.stopped, out_of_moves]
     words = ["success", "stopped_elsewhere", "out_of_moves"]

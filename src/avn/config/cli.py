@@ -234,7 +234,7 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
 
 
 def _known(error: BaseException) -> str:
-    """The keys that there are, where an error is about one that is not."""
+    """Return the keys of a node as text if an error is about an unknown key."""
     schema = getattr(error, "object_type", None)
     if " not in '" not in str(error) or not dataclasses.is_dataclass(schema):
         return ""

@@ -106,10 +106,10 @@ class OptionFilesPath(SearchPathPlugin):
 
 
 def _on_top(group: str, node: DictConfig, defaults: ListConfig) -> tuple[DictConfig, ListConfig]:
-    """An option with a class of its own, on top of the options of its group that it names.
+    """Merge an option with a class of its own onto the options of its group that it names.
 
-    Hydra would merge the schema of the one class into that of the other. Here the settings are
-    merged first, and the class of the option says which there are.
+    Hydra would merge the schema of one class into that of the other. Here, the settings are merged
+    first, and the class of the option then determines the schema.
     """
     kept: list[Any] = []
     below: Any = OmegaConf.create()

@@ -1,4 +1,4 @@
-"""The same world for Gymnasium; `import avn.rl` makes it known as "avn/Walk-v0"."""
+"""Environments for Gymnasium; `import avn.rl` registers them as "avn/Walk-v0"."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.sound_network import has_sound_model
 from avn.pipeline.stage import build
 from avn.rl.algorithm import Algorithm
-from avn.rl.environment import WalkEnv
+from avn.rl.environment import NavigationEnv
 
 Observation = dict[str, NDArray[Any]]
 
 
-class WalkGym(gymnasium.Env[Observation, int]):
-    """One agent that walks.
+class NavigationGymEnv(gymnasium.Env[Observation, int]):
+    """Gymnasium environment with one agent.
 
     Parameters
     ----------
-    world : World
-        With one episode at a time.
+    episodes : BatchedEpisodes
+        Batch of one episode.
     observes : sequence of str
-        See `avn.rl.environment.WalkEnv`.
+        Names of the observations; see `avn.rl.environment.NavigationEnv`.
     """
 
-    def __init__(self, world: BatchedEpisodes, observes: Sequence[str]) -> None:
+    def __init__(self, episodes: BatchedEpisodes, observes: Sequence[str]) -> None:
         self.metadata = {"render_modes": []}
-        self._env = WalkEnv(world, observes)
+        self._env = NavigationEnv(episodes, observes)
         self.observation_space: spaces.Space[Any] = _space(self._env)
-        self.action_space: spaces.Space[Any] = spaces.Discrete(world.protocol.actions)
+        self.action_space: spaces.Space[Any] = spaces.Discrete(episodes.protocol.actions)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin a new episode."""
+        """Begin a new episode. See `gymnasium.Env.reset`."""
         super().reset(seed=seed)
         if seed is not None:
             self._env.set_seed(seed)
@@ -63,7 +63,7 @@ class WalkGym(gymnasium.Env[Observation, int]):
         return self._seen(), {}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One action."""
+        """Take one action. See `gymnasium.Env.step`."""
         outcome = self._env.move(torch.tensor([int(action)]))
         reward, terminated, truncated = (value.item() for value in outcome)
         return self._seen(), float(reward), bool(terminated), bool(truncated), {}
@@ -72,21 +72,29 @@ class WalkGym(gymnasium.Env[Observation, int]):
         return {name: value[0] for name, value in _arrays(self._env).items()}
 
 
-class WalkVector(VectorEnv[Observation, NDArray[Any], NDArray[Any]]):
-    """N agents that walk at once; an episode that ends begins anew in the same step."""
+class NavigationVectorEnv(VectorEnv[Observation, NDArray[Any], NDArray[Any]]):
+    """Gymnasium environment with N agents; episodes reset in the step in which they end.
 
-    def __init__(self, world: BatchedEpisodes, observes: Sequence[str]) -> None:
+    Parameters
+    ----------
+    episodes : BatchedEpisodes
+        Batch of N episodes.
+    observes : sequence of str
+        Names of the observations; see `avn.rl.environment.NavigationEnv`.
+    """
+
+    def __init__(self, episodes: BatchedEpisodes, observes: Sequence[str]) -> None:
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
-        self._env, self.num_envs = WalkEnv(world, observes), world.n
+        self._env, self.num_envs = NavigationEnv(episodes, observes), episodes.n
         self.single_observation_space = _space(self._env)
-        self.single_action_space = spaces.Discrete(world.protocol.actions)
-        self.observation_space = batch_space(self.single_observation_space, world.n)
-        self.action_space = batch_space(self.single_action_space, world.n)
+        self.single_action_space = spaces.Discrete(episodes.protocol.actions)
+        self.observation_space = batch_space(self.single_observation_space, episodes.n)
+        self.action_space = batch_space(self.single_action_space, episodes.n)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin new episodes."""
+        """Begin new episodes. See `gymnasium.vector.VectorEnv.reset`."""
         super().reset(seed=seed)
         if seed is not None:
             self._env.set_seed(seed)
@@ -96,7 +104,7 @@ class WalkVector(VectorEnv[Observation, NDArray[Any], NDArray[Any]]):
     def step(
         self, actions: NDArray[Any]
     ) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """One action in each episode."""
+        """Take one action in each episode. See `gymnasium.vector.VectorEnv.step`."""
         outcome = self._env.move(torch.as_tensor(actions, dtype=torch.int64))
         reward, terminated, truncated = (value.numpy() for value in outcome)
         done, info = terminated | truncated, {}
@@ -106,42 +114,63 @@ class WalkVector(VectorEnv[Observation, NDArray[Any], NDArray[Any]]):
         return _arrays(self._env), reward.astype(np.float64), terminated, truncated, info
 
 
-def make_walk(
+def make_env(
     overrides: Sequence[str] = (),
     part: str = "train",
     observes: Sequence[str] | None = None,
     max_steps: int | None = 200,
     **_: Any,
-) -> WalkGym:
-    """One agent in the apartments of a config.
+) -> NavigationGymEnv:
+    """Make an environment with one agent in the apartments of a config.
 
     Parameters
     ----------
     overrides : sequence of str
-        Of `python -m avn.train model=a3c_va`, such as `split=mini`.
+        Overrides of `python -m avn.train model=a3c_va`, such as `split=mini`.
     part : {"train", "validation"}
-        Whose apartments.
+        Part of the split whose apartments are used.
     observes : sequence of str, optional
-        What the agent observes; by default what the row of the model does.
+        Names of the observations; those of the model by default.
     max_steps : int or None
         Actions after which an episode is truncated; None for the limits of the protocol.
+
+    Returns
+    -------
+    NavigationGymEnv
+
+    Raises
+    ------
+    UserError
+        If a setting is not valid.
     """
-    return WalkGym(*_world(tuple(overrides), part, 1, observes, max_steps))
+    return NavigationGymEnv(*_episodes(tuple(overrides), part, 1, observes, max_steps))
 
 
-def make_walks(
+def make_vector_env(
     num_envs: int = 1,
     overrides: Sequence[str] = (),
     part: str = "train",
     observes: Sequence[str] | None = None,
     max_steps: int | None = 200,
     **_: Any,
-) -> WalkVector:
-    """N agents at once; see `make_walk`."""
-    return WalkVector(*_world(tuple(overrides), part, num_envs, observes, max_steps))
+) -> NavigationVectorEnv:
+    """Make an environment with N agents in the apartments of a config.
+
+    Parameters
+    ----------
+    num_envs : int
+        N, number of agents.
+    overrides, part, observes, max_steps
+        See `make_env`.
+
+    Returns
+    -------
+    NavigationVectorEnv
+    """
+    return NavigationVectorEnv(*_episodes(tuple(overrides), part, num_envs, observes, max_steps))
 
 
-def _world(
+def _episodes(
     overrides: tuple[str, ...],
     part: str,
     n: int,
@@ -150,17 +179,17 @@ def _world(
 ) -> tuple[BatchedEpisodes, Sequence[str]]:
     tables, default, protocol, recipe = _tables(overrides, part)
     starts = build_start_sampler(tables)
-    world = BatchedEpisodes(
+    episodes = BatchedEpisodes(
         tables, starts, n, protocol, max_steps, recipe.reward, recipe.train_seed
     )
-    return world, observes or default
+    return episodes, observes or default
 
 
 @lru_cache(maxsize=4)
 def _tables(
     overrides: tuple[str, ...], part: str
 ) -> tuple[SceneBatch, tuple[str, ...], Protocol, Algorithm]:
-    # many environments of one process look into the same tables
+    # the environments of one process share the tables
     cfg = _config(overrides)
     if part not in policy_data.SUBSETS:
         raise UserError(f"part: '{part}' is none of {', '.join(policy_data.SUBSETS)}")
@@ -173,7 +202,7 @@ def _tables(
 
 
 def _config(overrides: tuple[str, ...]) -> Any:
-    """The config of `avn.train`, also from within a command of Hydra."""
+    """Compose the config of `avn.train`, also within a command of Hydra."""
     registry.register()
     chosen = [*([] if any(o.startswith("model=") for o in overrides) else ["model=a3c_va"])]
     if GlobalHydra.instance().is_initialized():
@@ -182,7 +211,7 @@ def _config(overrides: tuple[str, ...]) -> Any:
         return compose("train", overrides=[*chosen, *overrides])
 
 
-def _arrays(env: WalkEnv) -> Observation:
+def _arrays(env: NavigationEnv) -> Observation:
     seen = env.observation()
     shown = env.features(seen["state"], seen["clip"])
     shown |= {name: seen[name] for name in env.observes if name in seen}
@@ -195,8 +224,8 @@ def _array(value: Tensor) -> NDArray[Any]:
     return value.float().numpy() if value.dtype == torch.float16 else value.numpy()
 
 
-def _space(env: WalkEnv) -> spaces.Dict:
-    """What one agent observes, as a space."""
+def _space(env: NavigationEnv) -> spaces.Dict:
+    """Return the observation space of one agent."""
     own: dict[str, spaces.Space[Any]] = {}
     for name, value in _arrays(env).items():
         if name in _RANGES:
@@ -207,5 +236,5 @@ def _space(env: WalkEnv) -> spaces.Dict:
     return spaces.Dict(own)
 
 
-# Odometry counts cells, of which no apartment has so many in a row.
+# Odometry counts cells; the bound is more than any apartment has.
 _RANGES = {"map": (0.0, 1.0), "collided": (0, 1), "odometry": (-10_000, 10_000)}

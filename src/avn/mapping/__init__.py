@@ -1,0 +1,1 @@
+"""Maps and spatial memories of N agents, and their localisation."""

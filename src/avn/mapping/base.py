@@ -1,4 +1,4 @@
-"""What a mapper is: it remembers the place for N agents at once, and says where they are."""
+"""Base class of mappers, which map the apartment for N agents and localise them."""
 
 from __future__ import annotations
 
@@ -16,94 +16,114 @@ if TYPE_CHECKING:
 
 
 class Mapper(ABC):
-    """Remembers the place for N agents.
+    """Map of the apartment for each of N agents.
 
     Attributes
     ----------
     needs : tuple of str
-        Observations without which it cannot map.
+        Names of the observations that it needs.
     explores : bool
-        Whether it is shown the exploration walk.
+        True if it is given the exploration trajectory.
     pose : (N, 3) int64 tensor
         Column, row and heading of the agents on their maps.
     location : (N, 2) float64 tensor
-        Column and row before they are rounded to a square.
+        Column and row before rounding to a square.
     graph : PartialGraph
-        Nodes and edges that the planner plans on.
-    reveals : tuple of str
-        Parts of the truth that it can be shown: `map`, `pose`.
-    in_walk : bool
-        Whether the map lies in the frame of the exploration walk, not in that of the start.
+        Nodes and edges for the planner.
+    ground_truths : tuple of str
+        Parts of the ground truth that it can be given: `map`, `pose`.
+    in_exploration_frame : bool
+        True if the map lies in the frame of the exploration trajectory, False if it lies in the
+        frame of the start.
     retrieved : (N, k) float32 and (N, k, 3) int64 tensors, or None
-        What a memory returned last, for pictures: cosines and places in the frame of the walk.
+        Entries that the spatial memory returned last, for figures: cosine similarities, and poses
+        in the frame of the exploration trajectory.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
-    reveals: ClassVar[tuple[str, ...]] = ()
+    ground_truths: ClassVar[tuple[str, ...]] = ()
     explores: ClassVar[bool] = False
     pose: Tensor
     location: Tensor
     graph: PartialGraph
-    in_walk: bool = False
+    in_exploration_frame: bool = False
     retrieved: tuple[Tensor, Tensor] | None = None
 
     def unused_settings(self) -> tuple[str, ...]:
-        """Settings of its own that make no difference to it, by name."""
+        """Return the names of its settings that have no effect."""
         return ()
 
     @abstractmethod
     def reset(self, n: int, rules: GraphRules) -> None:
-        """Begin N new episodes, of which nothing is known."""
+        """Begin N new episodes with empty maps.
+
+        Parameters
+        ----------
+        n : int
+            Number of episodes.
+        rules : GraphRules
+            Rules of the graph.
+        """
 
     def belief(self, rows: Tensor) -> Tensor | None:
-        """Probability that each square of some agents' maps is free, for pictures.
+        """Return the probability that each square of some agents' maps is free, for figures.
 
         Parameters
         ----------
         rows : (R,) int64 tensor
+            Numbers of the agents.
 
         Returns
         -------
         (R, M, M) float32 tensor, or None
-            By square to the front and to the right; None where it has no such map.
+            By square to the front and square to the right; None without such a map.
         """
         return None
 
-    def explore(self, walks: TensorDict, walk: Tensor) -> None:
-        """Remember exploration walks.
+    def explore(self, trajectories: TensorDict, trajectory_index: Tensor) -> None:
+        """Process the exploration trajectories, after `reset` and before the first observation.
 
         Parameters
         ----------
-        walks : TensorDict of batch size (W, T)
-            What was observed at each step of each walk, odometry since its own start.
-        walk : (N,) int64 tensor
-            Which walk each agent made.
+        trajectories : TensorDict of batch size (W, T)
+            Observations at each step of each trajectory; odometry is relative to its first state.
+        trajectory_index : (N,) int64 tensor
+            Trajectory of each agent.
         """
         return
 
-    def reveal(self, part: str, simulator: Simulator) -> None:
-        """Take in a part of the truth, for ablations: the true `map`, or the true `pose`.
+    def set_ground_truth(self, part: str, simulator: Simulator) -> None:
+        """Set a part of the ground truth, for ablations.
+
+        Parameters
+        ----------
+        part : {"map", "pose"}
+            The true map, or the true pose of the start in the exploration frame.
+        simulator : Simulator
+            Holds the true grid and states.
 
         Raises
         ------
         UserError
-            Where this mapper has no use for it.
+            If the mapper has no use for the part.
         """
         raise UserError(
             f"agent.oracle_inputs: '{part}' is nothing that {type(self).__name__} can be shown"
         )
 
-    def rest(self, done: Tensor) -> None:
-        """Be told which agents' episodes are over, (N,) bool, to save the work for them."""
+    def set_active(self, active: Tensor) -> None:
+        """Set which episodes are not over, (N,) bool, to save work on the others."""
         return
 
     @abstractmethod
-    def observe(self, observation: TensorDict, way: Tensor) -> None:
-        """Take in the newest observations: find the agents, and bring map and graph up to date.
+    def observe(self, observation: TensorDict, direction: Tensor) -> None:
+        """Localise the agents, and update map and graph with the newest observations.
 
         Parameters
         ----------
         observation : TensorDict of batch size (N,)
-        way : (N,) int64 tensor
-            0 where the last action was a move forward, 2 a move backward, -1 none of both.
+            See `Simulator.observe`.
+        direction : (N,) int64 tensor
+            Direction of the last action, quarter turns from the heading: 0 for a move forward, 2
+            for a move backward; -1 for any other action.
         """

@@ -1,4 +1,4 @@
-"""The map as an agent has it before its eyes: centred on it and turned to its heading."""
+"""Egocentric maps: occupancy maps centred on the agent and turned to its heading."""
 
 from __future__ import annotations
 
@@ -13,31 +13,32 @@ from avn.core.actions import BACKWARD, HEADINGS
 from avn.core.errors import UserError
 from avn.core.pose import turned
 from avn.mapping.occupancy_map import OccupancyMap
-from avn.mapping.occupancy_mapper import take_in
+from avn.mapping.occupancy_mapper import update_map
 
 WIDTH = 21
 
 
 class EgoMap:
-    """Occupancy maps of N agents, of which each sees the part around it.
+    """Occupancy maps of N agents, and the egocentric part of each.
 
     Parameters
     ----------
     n : int
+        Number of agents.
     size : int
         Squares along each side of the maps, odd.
     width : int
-        Squares along each side of the part, odd.
+        Squares along each side of the egocentric part, odd.
 
     Attributes
     ----------
     map : OccupancyMap
-        Each in the frame of its agent's start.
+        Maps in the frames of the agents' starts.
 
     Raises
     ------
     UserError
-        Where `width` is no odd number, or the map is smaller.
+        If `width` is even or more than `size`.
     """
 
     def __init__(self, n: int, size: int = 101, width: int = WIDTH) -> None:
@@ -48,54 +49,54 @@ class EgoMap:
         self._offsets = offsets(width)
 
     def reset(self, rows: Tensor) -> None:
-        """Forget all that the agents of some rows know, (N,) bool."""
+        """Clear the maps of some rows, (N,) bool."""
         chosen = rows.nonzero()[:, 0]
         self.map.forget(chosen)
         self._last[chosen] = 0
 
     def keep(self, rows: Tensor) -> None:
-        """Go on with some of the agents alone, by number."""
+        """Keep the maps of the agents with the given numbers alone."""
         self.map.keep(rows)
         self._last = self._last[rows]
 
     def observe(self, observation: TensorDict, actions: Tensor | None = None) -> Tensor:
-        """Take in the newest observations, and give what is around each agent.
+        """Update the maps with the newest observations, and return the part around each agent.
 
         Parameters
         ----------
         observation : TensorDict of batch size (N,)
             `odometry`, `collided` and `local_patch`.
         actions : (N,) int64 tensor, optional
-            The last actions, without which collisions tell nothing.
+            Last actions; without them collisions are ignored.
 
         Returns
         -------
         (N, width, width) float32 tensor
-            Belief that each square is free, 0.5 where nothing is known; rows are to the agent's
-            front, the farthest last, columns to its right.
+            Probability that each square is free, 0.5 if unknown. Rows go from the back to the
+            front of the agent, columns from its left to its right.
         """
         pose = observation["odometry"]
         if actions is None:
-            way = torch.full((len(pose),), -1)
+            direction = torch.full((len(pose),), -1)
         else:
-            way = torch.where(actions <= BACKWARD, 2 * actions, -1)
-        take_in(self.map, pose, self._last, observation, way, sees=True)
+            direction = torch.where(actions <= BACKWARD, 2 * actions, -1)
+        update_map(self.map, pose, self._last, observation, direction, sees=True)
         self._last = pose.clone()
         return around(self.map.log_odds, torch.arange(len(pose)), pose, self._offsets)
 
     def state_dict(self) -> dict[str, Tensor]:
-        """All that goes on changing."""
+        """Return copies of the maps and the last poses."""
         kept = self.map.state_dict() | {"last": self._last}
         return {name: value.clone() for name, value in kept.items()}
 
     def load_state_dict(self, kept: dict[str, Tensor]) -> None:
-        """Go on where `state_dict` was taken."""
+        """Restore what `state_dict` returned."""
         self.map.load_state_dict(kept)
         self._last = kept["last"].clone()
 
 
 def offsets(width: int) -> Tensor:
-    """Squares (right, front) of the part around an agent for each heading, (4, width**2, 2)."""
+    """Return the squares (right, front) around an agent for each heading, (4, width**2, 2)."""
     half = width // 2
     front, right = torch.meshgrid(
         torch.arange(-half, half + 1), torch.arange(-half, half + 1), indexing="ij"
@@ -105,18 +106,18 @@ def offsets(width: int) -> Tensor:
 
 
 def around(log_odds: Tensor, row: Tensor, pose: Tensor, squares: Tensor) -> Tensor:
-    """The part of a map that is around each agent.
+    """Extract the part of a map around each agent.
 
     Parameters
     ----------
     log_odds : (W, M, M) float32 tensor
-        Maps, as those of `OccupancyMap`.
+        Maps; see `OccupancyMap`.
     row : (N,) int64 tensor
-        Which of them each agent has.
+        Map of each agent.
     pose : (N, 3) int64 tensor
-        Right, front and heading in its frame.
+        Squares to the right, squares to the front and heading in the frame of the map.
     squares : (4, width**2, 2) int64 tensor
-        As `offsets` gives it.
+        See `offsets`.
 
     Returns
     -------
@@ -137,7 +138,7 @@ def _around(
     squares: NDArray[np.int64],
     found: NDArray[np.float32],
 ) -> None:
-    """Fill `found`, (N, width**2); a loop, since most of the work would be indices in tensors."""
+    """Fill `found`, (N, width**2), in a loop, which needs no index tensors."""
     size = log_odds.shape[-1]
     half = size // 2
     for n in range(len(row)):

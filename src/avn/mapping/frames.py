@@ -1,4 +1,4 @@
-"""Where one frame lies in another: pictures that are recognised vote, and the winner counts."""
+"""Alignment of two frames by votes of recognised views."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from avn.core.pose import turned
 
 
 class FrameAligner:
-    """Votes of N agents for where the frame of their start lies in that of their walk.
+    """Votes of N agents for the pose of their start in the frame of their exploration.
 
-    A place p with heading h since the start lies at R(turn) p + shift, with heading h + turn, in
-    the frame of the walk.
+    A position p with heading h in the frame of the start has the position R(turn) p + shift and
+    the heading h + turn in the frame of the exploration.
 
     Parameters
     ----------
     n, size : int
-        Agents, and squares along each side of a map; shifts by more than half of it are ignored.
+        Number of agents, and squares along each side of a map; shifts of more than half of it are
+        ignored.
     sharpness : float
-        A picture with cosine s has the vote exp((s - 1) / sharpness).
+        Scale of the cosine similarity: a view with similarity s has exp((s - 1) / sharpness) votes.
     """
 
     def __init__(self, n: int, size: int, sharpness: float) -> None:
@@ -33,48 +34,49 @@ class FrameAligner:
         self,
         pose: Tensor,
         similarity: Tensor,
-        places: Tensor,
+        poses: Tensor,
         confidence: float,
         rows: Tensor | None = None,
     ) -> Tensor:
-        """Count the votes of the newest pictures; a place and heading votes once.
+        """Add the votes of the newest views; each pose votes once.
 
         Parameters
         ----------
         pose : (N, 3) int64 tensor
-            Where the agents are since the start.
+            Squares to the right, squares to the front and heading since the start.
         similarity : (N, k) float32 tensor
-        places : (N, k, 3) int64 tensor
-            Where similar pictures were taken in the walk.
+            Cosine similarity of the view and the retrieved entries.
+        poses : (N, k, 3) int64 tensor
+            Poses of the retrieved entries in the frame of the exploration.
         confidence : float
             Votes that a winner needs.
         rows : (n,) int64 tensor, optional
-            Agents whose winner is looked for, by number; all by default.
+            Numbers of the agents whose winner is updated; all by default.
 
         Returns
         -------
         (N,) bool tensor
-            Whose winner is now another.
+            Agents whose winner has changed.
         """
         state = self._index(pose[:, 2], pose[:, :2])[:, None]
         fresh = ~self._voted.gather(1, state)
         self._voted.scatter_(1, state, torch.ones_like(fresh))
-        turn = (places[..., 2] - pose[:, None, 2]) % HEADINGS
-        k = places.shape[1]
+        turn = (poses[..., 2] - pose[:, None, 2]) % HEADINGS
+        k = poses.shape[1]
         moved = turned(pose[:, None, :2].expand(-1, k, -1).reshape(-1, 2), turn.reshape(-1))
-        shift = places[..., :2] - moved.view(-1, k, 2)
+        shift = poses[..., :2] - moved.view(-1, k, 2)
         inside = (shift.abs() <= self.centre).all(dim=-1) & fresh
         weight = torch.exp((similarity - 1) / self.sharpness)
         index = self._index(turn, shift.clamp(-self.centre, self.centre))
         self._votes.scatter_add_(1, index, torch.where(inside, weight, 0.0))
         return self._elect(confidence, torch.arange(len(pose)) if rows is None else rows)
 
-    def settle(self, shift: Tensor, turn: Tensor) -> None:
-        """Let the frames lie where they are told to, (N, 2) and (N,), whatever is voted."""
+    def set(self, shift: Tensor, turn: Tensor) -> None:
+        """Fix the alignment at a shift (N, 2) and a turn (N,), whatever the votes."""
         self._votes.scatter_(1, self._index(turn, shift)[:, None], torch.inf)
 
     def reject(self, rows: Tensor) -> Tensor:
-        """Take the winner of some agents out for ever; gives the same rows, where they had one."""
+        """Exclude the winners of some agents, and return the rows that had one, (N,) bool."""
         chosen = rows & (self._winner >= 0)
         at = chosen.nonzero()[:, 0]
         self._votes[at, self._winner[at]] = -torch.inf
@@ -82,7 +84,7 @@ class FrameAligner:
         return chosen
 
     def best(self) -> tuple[Tensor, Tensor, Tensor]:
-        """The winners' shift (N, 2) and turn (N,), and whether there is one, (N,) bool."""
+        """Return shift (N, 2) and turn (N,) of the winners, and True if there is one, (N,) bool."""
         winner = self._winner.clamp(min=0)
         turn, square = winner // self.size**2, winner % self.size**2
         shift = torch.stack((square % self.size, square // self.size), dim=1) - self.centre
@@ -103,7 +105,7 @@ class FrameAligner:
 
 
 def turned_walls(walls: Tensor, turn: Tensor) -> Tensor:
-    """Wall bits of the walk's frame, (N, S) uint8, as bits of the frame that lies turned in it."""
+    """Convert wall bits, (N, S) uint8, to a frame that is turned by quarter turns, (N,)."""
     bits = torch.arange(HEADINGS)
     there = (bits + turn[:, None]) % HEADINGS
     out = torch.zeros_like(walls)

@@ -1,4 +1,4 @@
-"""`mapper=spatial_memory`: explores first, then finds itself by what places look like."""
+"""Mapper `spatial_memory`, which localises the agent by the views of an exploration."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from avn.core.pose import turned
 from avn.mapping.base import Mapper
 from avn.mapping.frames import FrameAligner, turned_walls
 from avn.mapping.occupancy_map import CERTAIN, OccupancyMap
-from avn.mapping.occupancy_mapper import take_in
+from avn.mapping.occupancy_mapper import update_map
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.planning.partial_graph import GraphRules, PartialGraph
 
@@ -25,31 +25,36 @@ LOCALISATIONS = ("retrieval", "retrieval+odometry")
 
 
 class MemoryMapper(Mapper):
-    """Remembers a walk as pictures with their places, and as a graph of visited squares.
+    """Mapper with a spatial memory of the exploration trajectory and a graph of its squares.
 
-    While the agent seeks the source, the memory tells where it is. With "retrieval" place and
-    heading are what the memory returns and nothing else: the map lies in the frame of the walk.
-    With "retrieval+odometry" the map lies in the frame of the start; every picture that the
-    memory recognises votes for where the walk lies in it, and the winner is laid over the map.
+    With "retrieval", the pose is the one that the memory returns, and the map lies in the frame of
+    the exploration. With "retrieval+odometry", the map lies in the frame of the start; recognised
+    views vote for the alignment of the two frames, and the map of the exploration is overlaid at
+    the winning alignment.
 
     Parameters
     ----------
     size : int
-        Squares along each side of the map, odd.
+        Squares along each side of the map, odd, 11 or more.
     top : int
-        Entries that an estimate of the place is made of.
+        Retrieved entries that an estimate of the pose averages, 1 or more.
     localisation : {"retrieval", "retrieval+odometry"}
-        Whether it takes itself to be where the memory says, or where odometry since the start
-        says, on a map over which the walk is laid.
+        Source of the pose: the spatial memory alone, or odometry since the start, with the map of
+        the exploration overlaid.
     local_patches : bool
-        Whether the map also takes in which squares look free, in the walk and later.
+        True if the map integrates the local patches, in the exploration and afterwards.
     edges : {"consecutive", "adjacent"}
-        Whether squares of the walk are joined where the walk went from one to the other, or
-        wherever they are neighbours.
+        Edges between visited squares: those the agent moved along, or those between all
+        neighbours.
     sharpness : float
-        A picture that is less like an entry by this much, in cosine, has 1 / e of its vote.
+        Drop of the cosine similarity at which a vote falls to 1 / e, more than 0.
     confidence : float
-        Votes from which the walk is laid over the map; an equal picture has one.
+        Votes that an alignment needs, more than 0; an identical view has one vote.
+
+    Raises
+    ------
+    UserError
+        If a setting is out of range.
     """
 
     explores = True
@@ -71,100 +76,104 @@ class MemoryMapper(Mapper):
         if not (sharpness > 0 and confidence > 0):
             raise UserError("mapper.sharpness and mapper.confidence are over 0")
         self.size, self.top, self.localisation = size, top, localisation
-        self.in_walk = localisation == "retrieval"
+        self.in_exploration_frame = localisation == "retrieval"
         self.edges, self.sharpness, self.confidence = edges, sharpness, confidence
         self.local_patches = local_patches
         self.needs = ("visual_embedding", "local_patch") if local_patches else ("visual_embedding",)  # type: ignore[misc]
-        self.reveals = () if self.in_walk else ("pose",)  # type: ignore[misc]
+        self.ground_truths = () if self.in_exploration_frame else ("pose",)  # type: ignore[misc]
 
     def unused_settings(self) -> tuple[str, ...]:
-        """Those of the votes, where it goes by what it recognises alone."""
-        return ("sharpness", "confidence") if self.in_walk else ()
+        """Return the settings of the votes for "retrieval". See `Mapper.unused_settings`."""
+        return ("sharpness", "confidence") if self.in_exploration_frame else ()
 
     def reset(self, n: int, rules: GraphRules) -> None:
-        """Begin N new episodes; the walks come with `explore`."""
+        """Begin N new episodes. See `Mapper.reset`."""
         self.map = OccupancyMap(n, self.size)
         self.graph = PartialGraph(n, self.size, rules)
         self._last = torch.zeros(n, 3, dtype=torch.int64)
-        self._awake = torch.arange(n)
+        self._active = torch.arange(n)
         self._memory: SpatialMemory | None = None
         self.retrieved = None
 
-    def explore(self, walks: TensorDict, walk: Tensor) -> None:
-        """Remember the walks: pictures, visited squares and the edges between them."""
-        keys, values = distinct(walks["visual_embedding"], walks["odometry"])
-        self._memory = SpatialMemory(keys, values, walk, self.top)
-        self._known = self._walked(walks)
-        self._walk = walk
+    def explore(self, trajectories: TensorDict, trajectory_index: Tensor) -> None:
+        """Store views, visited squares and the edges between them. See `Mapper.explore`."""
+        keys, values = distinct(trajectories["visual_embedding"], trajectories["odometry"])
+        self._memory = SpatialMemory(keys, values, trajectory_index, self.top)
+        self._known = self._explored_map(trajectories)
+        self._walk = trajectory_index
         if self.localisation == "retrieval":
-            self.map.log_odds.copy_(self._known.log_odds[walk])
-            self.map.walls.copy_(self._known.walls[walk])
+            self.map.log_odds.copy_(self._known.log_odds[trajectory_index])
+            self.map.walls.copy_(self._known.walls[trajectory_index])
             self.graph.walls = self.map.walls.numpy()
-            every = torch.arange(self.size**2).expand(len(walk), -1)
+            every = torch.arange(self.size**2).expand(len(trajectory_index), -1)
             self.graph.set(every, self.map.belief.flatten(1))
         else:
-            self._votes = FrameAligner(len(walk), self.size, self.sharpness)
+            self._votes = FrameAligner(len(trajectory_index), self.size, self.sharpness)
             self._overlaid = torch.zeros_like(self.map.log_odds)
             self._overlaid_walls = torch.zeros_like(self.map.walls)
 
     def belief(self, rows: Tensor) -> Tensor:
-        """What each square is believed to be, (R, M, M): own map and walk together."""
+        """Return the probability that each square is free. See `Mapper.belief`."""
         own = self.map.log_odds[rows]
-        return torch.sigmoid(own if self.in_walk else self._both(own, self._overlaid[rows]))
+        return torch.sigmoid(
+            own if self.in_exploration_frame else self._both(own, self._overlaid[rows])
+        )
 
-    def reveal(self, part: str, simulator: Simulator) -> None:
-        """Take in where the walk truly lies in the frame of the start."""
+    def set_ground_truth(self, part: str, simulator: Simulator) -> None:
+        """Fix the alignment of the frames at the true one. See `Mapper.set_ground_truth`."""
         if part != "pose" or self.localisation == "retrieval":
-            super().reveal(part, simulator)
-        lattice = torch.from_numpy(simulator.place.grid.lattice).long()
-        first = torch.from_numpy(simulator.episodes.walks[:, 0])[simulator.episodes.walk]
+            super().set_ground_truth(part, simulator)
+        lattice = torch.from_numpy(simulator.scene.grid.lattice).long()
+        first = torch.from_numpy(simulator.episodes.trajectories[:, 0])[
+            simulator.episodes.trajectory_index
+        ]
         start, heading = simulator.start, first % HEADINGS
         shift = lattice[start // HEADINGS] - lattice[first // HEADINGS]
-        self._votes.settle(turned(shift, -heading % HEADINGS), (start - first) % HEADINGS)
+        self._votes.set(turned(shift, -heading % HEADINGS), (start - first) % HEADINGS)
 
-    def rest(self, done: Tensor) -> None:
-        """Look for the walks of agents that go on alone."""
-        self._awake = (~done).nonzero()[:, 0]
+    def set_active(self, active: Tensor) -> None:
+        """Set for which agents the alignment is updated. See `Mapper.set_active`."""
+        self._active = active.nonzero()[:, 0]
 
-    def observe(self, observation: TensorDict, way: Tensor) -> None:
-        """Find the agents, and bring map, memory and graph up to date."""
+    def observe(self, observation: TensorDict, direction: Tensor) -> None:
+        """Localise the agents, and update map, memory and graph. See `Mapper.observe`."""
         if self._memory is None:
             raise UserError(
                 "mapper: the spatial memory has no entry, for nothing was explored; "
                 "take episodes=frozen and protocol.exploration_steps=400"
             )
         if self.localisation == "retrieval":
-            self._observe_by_looks(self._memory, observation, way)
+            self._observe_by_looks(self._memory, observation, direction)
         else:
-            self._observe_by_votes(self._memory, observation, way)
+            self._observe_by_votes(self._memory, observation, direction)
 
     def _observe_by_looks(
-        self, memory: SpatialMemory, observation: TensorDict, way: Tensor
+        self, memory: SpatialMemory, observation: TensorDict, direction: Tensor
     ) -> None:
-        similarity, places = self.retrieved = memory.recall(observation["visual_embedding"])
-        found = locate(similarity, places)
+        similarity, poses = self.retrieved = memory.recall(observation["visual_embedding"])
+        found = locate(similarity, poses)
         pose = found.round().long()
-        squares = take_in(self.map, pose, self._last, observation, way, self.local_patches)
+        squares = update_map(self.map, pose, self._last, observation, direction, self.local_patches)
         self.graph.set(squares, torch.sigmoid(self.map.log_odds.flatten(1).gather(1, squares)))
         memory.add(observation["visual_embedding"], pose, similarity[:, 0] < 1 - 1e-4)
         self._place(pose, found[:, :2])
 
     def _observe_by_votes(
-        self, memory: SpatialMemory, observation: TensorDict, way: Tensor
+        self, memory: SpatialMemory, observation: TensorDict, direction: Tensor
     ) -> None:
         pose = observation["odometry"]
-        squares = take_in(self.map, pose, self._last, observation, way, self.local_patches)
-        similarity, places = self.retrieved = memory.recall(
+        squares = update_map(self.map, pose, self._last, observation, direction, self.local_patches)
+        similarity, poses = self.retrieved = memory.recall(
             observation["visual_embedding"], own=False
         )
-        awake = self._awake
-        changed = self._votes.vote(pose, similarity, places, self.confidence, awake)
-        if len(awake) == len(pose):
+        active = self._active
+        changed = self._votes.vote(pose, similarity, poses, self.confidence, active)
+        if len(active) == len(pose):
             own, overlaid = self.map.log_odds, self._overlaid
         else:
-            own, overlaid = self.map.log_odds[awake], self._overlaid[awake]
+            own, overlaid = self.map.log_odds[active], self._overlaid[active]
         wrong = torch.zeros(len(pose), dtype=torch.bool)
-        wrong[awake] = ((own <= -CERTAIN) & (overlaid >= CERTAIN)).flatten(1).any(dim=1)
+        wrong[active] = ((own <= -CERTAIN) & (overlaid >= CERTAIN)).flatten(1).any(dim=1)
         changed |= self._votes.reject(wrong)
         rows = changed.nonzero()[:, 0]
         if len(rows):
@@ -182,7 +191,7 @@ class MemoryMapper(Mapper):
         self.location = location + centre
 
     def _set(self, rows: Tensor, squares: Tensor) -> None:
-        """Give squares of some agents the cost of what walk and own map say together."""
+        """Set the costs of squares of some agents from own map and overlay together."""
         own = self.map.log_odds.flatten(1)[rows[:, None], squares]
         overlaid = self._overlaid.flatten(1)[rows[:, None], squares]
         self.graph.set(squares, torch.sigmoid(self._both(own, overlaid)), rows)
@@ -192,7 +201,7 @@ class MemoryMapper(Mapper):
         return torch.where(own.abs() >= CERTAIN, own, own + overlaid)
 
     def _lay(self, rows: Tensor) -> None:
-        """Lay what the walk knows over the maps of some agents, where they take it to lie."""
+        """Overlay the maps of the exploration on those of some agents at the winning alignment."""
         shift, turn, known = (part[rows] for part in self._votes.best())
         side = torch.arange(self.size) - self.map.centre
         squares = torch.stack(torch.meshgrid(side, side, indexing="xy"), dim=-1).reshape(1, -1, 2)
@@ -200,26 +209,26 @@ class MemoryMapper(Mapper):
         inside = (there.abs() <= self.map.centre).all(dim=-1) & known[:, None]
         index = (there[..., 1] + self.map.centre) * self.size + there[..., 0] + self.map.centre
         index = torch.where(inside, index, 0)
-        walk = self._walk[rows][:, None]
-        odds = torch.where(inside, self._known.log_odds.flatten(1)[walk, index], 0.0)
-        walls = torch.where(inside, self._known.walls.flatten(1)[walk, index], 0)
+        trajectory_index = self._walk[rows][:, None]
+        odds = torch.where(inside, self._known.log_odds.flatten(1)[trajectory_index, index], 0.0)
+        walls = torch.where(inside, self._known.walls.flatten(1)[trajectory_index, index], 0)
         shape = (len(rows), self.size, self.size)
         self._overlaid[rows] = odds.reshape(shape)
         self._overlaid_walls[rows] = turned_walls(walls, turn).reshape(shape)
 
-    def _walked(self, walks: TensorDict) -> OccupancyMap:
-        """What each walk knows of the squares round its start."""
-        count, steps = walks.batch_size
+    def _explored_map(self, trajectories: TensorDict) -> OccupancyMap:
+        """Build the map of each trajectory in the frame of its first state."""
+        count, steps = trajectories.batch_size
         known = OccupancyMap(count, self.size)
         joined = torch.zeros(count, self.size**2, HEADINGS, dtype=torch.bool)
-        own, before = torch.arange(count), walks["odometry"][:, 0]
+        own, before = torch.arange(count), trajectories["odometry"][:, 0]
         for step in range(steps):
-            pose = walks["odometry"][:, step]
-            here = known.stand(pose)
+            pose = trajectories["odometry"][:, step]
+            here = known.mark_visited(pose)
             if self.local_patches:
-                known.see(pose, walks["local_patch"][:, step])
+                known.integrate(pose, trajectories["local_patch"][:, step])
             moved = (pose[:, :2] != before[:, :2]).any(dim=1)
-            joined[own, known.flat(before[:, :2]), pose[:, 2]] |= moved  # it only walks forward
+            joined[own, known.flat(before[:, :2]), pose[:, 2]] |= moved  # moves go forward alone
             joined[own, here, (pose[:, 2] + 2) % HEADINGS] |= moved
             before = pose
         if self.edges == "consecutive":
@@ -227,7 +236,7 @@ class MemoryMapper(Mapper):
         return known
 
     def _unjoined(self, known: OccupancyMap, joined: Tensor) -> Tensor:
-        """Walls between visited neighbours that the walk did not go between."""
+        """Return walls between visited neighbours that the trajectory did not move between."""
         visited = known.visited
         walls = torch.zeros_like(known.walls)
         ways = joined.reshape(*visited.shape, HEADINGS)

@@ -1,4 +1,4 @@
-"""The occupancy map: how much each square round N agents is believed to be free."""
+"""Occupancy maps: the probability that each square around N agents is free."""
 
 from __future__ import annotations
 
@@ -10,42 +10,42 @@ from avn.core.actions import HEADINGS
 from avn.core.errors import UserError
 from avn.core.pose import turned
 
-# What is known beyond doubt lies at this log odds, which no picture outweighs.
+# Log odds of squares that were visited or collided with, which no view can change.
 CERTAIN = 30.0
-# However many pictures agree, they stay below it.
+# Limit of the log odds that views can reach.
 _MOST = 15.0
-# What a single picture says is kept off 0 and 1 by this much.
+# Probabilities of a single view are clipped to this distance from 0 and 1.
 _MARGIN = 1e-4
 
 
 class OccupancyMap:
-    """Beliefs of N agents about M x M squares each, in a frame with its origin in the middle.
+    """Occupancy maps of N agents on M x M squares each, with the origin in the middle.
 
-    Every square starts at 0.5. A picture changes the squares of its window by Bayes' rule, as
-    independent evidence on odds (Moravec, "Sensor Fusion in Certainty Grids for Mobile Robots",
-    1989). The picture of a place and heading never changes, so that it counts once.
+    Every square starts at probability 0.5. A local patch updates the squares in front of the agent
+    by Bayes' rule on log odds, as independent evidence (Moravec, "Sensor Fusion in Certainty Grids
+    for Mobile Robots", 1989). The view of a pose never changes, so it counts once.
 
     Parameters
     ----------
     n : int
-        Agents.
+        Number of agents.
     size : int
-        Squares along each side, odd.
+        M, squares along each side, odd, 11 or more.
     prior : float or (5, 5) tensor
-        What is believed of a square of the window before a picture is looked at; the evidence of
-        a picture is its odds over these. 0.5 takes a picture's odds as they are.
+        Prior probability that a square of the local patch is free; its log odds are subtracted
+        from those of the patch.
 
     Attributes
     ----------
     log_odds : (N, M, M) float32 tensor
-        By square to the front and square to the right.
+        Log odds of being free, by square to the front and square to the right.
     walls : (N, M, M) uint8 tensor
-        Bit h is set where a move along heading h, between squares that are both free, was blocked.
+        Bit h is set if a move along heading h between two free squares was blocked.
 
     Raises
     ------
     UserError
-        Where `size` is no odd number from 11.
+        If `size` is even or less than 11.
     """
 
     def __init__(self, n: int, size: int = 101, prior: float | Tensor = 0.5) -> None:
@@ -59,6 +59,7 @@ class OccupancyMap:
         self._offsets = torch.from_numpy(window_offsets()).long().view(1, -1, 2)
 
     def __len__(self) -> int:
+        """Return N."""
         return len(self.log_odds)
 
     @property
@@ -68,64 +69,73 @@ class OccupancyMap:
 
     @property
     def visited(self) -> Tensor:
-        """Squares on which the agents have stood, (N, M, M) bool."""
+        """Squares that the agents have visited, (N, M, M) bool."""
         return self.log_odds >= CERTAIN
 
     def forget(self, rows: Tensor) -> None:
-        """Make the maps of some agents, by number, as they were at first."""
+        """Clear the maps of the agents with the given numbers."""
         self.log_odds[rows], self.walls[rows], self._seen[rows] = 0.0, 0, False
 
     def keep(self, rows: Tensor) -> None:
-        """Go on with the maps of some agents alone, by number."""
+        """Keep the maps of the agents with the given numbers alone."""
         self.log_odds, self.walls, self._seen = (
             own[rows] for own in (self.log_odds, self.walls, self._seen)
         )
 
     def state_dict(self) -> dict[str, Tensor]:
-        """All that is believed."""
+        """Return the tensors of the maps, without copies."""
         return {"log_odds": self.log_odds, "walls": self.walls, "seen": self._seen}
 
     def load_state_dict(self, kept: dict[str, Tensor]) -> None:
-        """Believe what `state_dict` gave."""
+        """Restore what `state_dict` returned."""
         self.log_odds, self.walls, self._seen = (
             kept[name].clone() for name in ("log_odds", "walls", "seen")
         )
 
     def flat(self, squares: Tensor) -> Tensor:
-        """Where squares (right, front) from the origin lie in a map laid out flat.
+        """Return the flat indices of squares.
+
+        Parameters
+        ----------
+        squares : (..., 2) int64 tensor
+            Squares to the right and to the front of the origin.
+
+        Returns
+        -------
+        (...,) int64 tensor
 
         Raises
         ------
         UserError
-            Where one lies outside.
+            If a square lies outside the map.
         """
         if bool((squares.abs() > self.centre).any()):
             raise UserError(f"mapper.size: an agent walked off a map of {self.size}; raise it")
         return self._index(squares)
 
-    def see(self, pose: Tensor, window: Tensor) -> Tensor:
-        """Take in what pictures tell of the window in front of each agent.
+    def integrate(self, pose: Tensor, local_patch: Tensor) -> Tensor:
+        """Integrate the local patch in front of each agent.
 
         Parameters
         ----------
         pose : (N, 3) int64 tensor
-            Right, front and heading.
+            Squares to the right, squares to the front and heading.
         local_patch : (N, 5, 5) float tensor
-            Probability that each square is free; NaN tells nothing.
+            Probability that each square is free; NaN for unknown.
 
         Returns
         -------
         (N, 25) int64 tensor
-            Squares that may have changed, as `flat` counts them.
+            Flat indices of the squares that may have changed.
         """
         state = (self.flat(pose[:, :2]) * HEADINGS + pose[:, 2])[:, None]
         fresh = ~self._seen.gather(1, state)
         self._seen.scatter_(1, state, torch.ones_like(fresh))
         squares = pose[:, None, :2] + turned(self._offsets.expand(len(pose), -1, -1), pose[:, 2])
         inside = (squares.abs() <= self.centre).all(dim=-1)
-        evidence = torch.logit(window.float(), eps=_MARGIN) - self._prior
+        evidence = torch.logit(local_patch.float(), eps=_MARGIN) - self._prior
         evidence = torch.nan_to_num(evidence, nan=0.0).flatten(1)
-        # Squares off the map are moved onto its middle, where somebody stands: certain already.
+        # Squares off the map become the agent's own square, which is visited and does not change.
         index = self._index(torch.where(inside[..., None], squares, pose[:, None, :2]))
         beliefs = self.log_odds.flatten(1)
         before = beliefs.gather(1, index)
@@ -133,30 +143,31 @@ class OccupancyMap:
         beliefs.scatter_(1, index, torch.where(fresh & (before.abs() < CERTAIN), after, before))
         return index
 
-    def stand(self, pose: Tensor) -> Tensor:
-        """Note that the squares under the agents are free; gives them, (N,) int64, flat."""
+    def mark_visited(self, pose: Tensor) -> Tensor:
+        """Mark the squares of the agents as free, and return their flat indices, (N,) int64."""
         index = self.flat(pose[:, :2])
         self.log_odds.flatten(1).scatter_(1, index[:, None], CERTAIN)
         return index
 
-    def bump(self, pose: Tensor, heading: Tensor, blocked: Tensor) -> Tensor:
-        """Note moves that were blocked: the square ahead is not free.
+    def mark_collision(self, pose: Tensor, heading: Tensor, blocked: Tensor) -> Tensor:
+        """Mark the squares that blocked moves led to as not free.
 
-        Where the agent has stood on that square before, it is the way between that is blocked.
+        If the agent has visited the square before, the edge to it is marked as a wall instead.
 
         Parameters
         ----------
         pose : (N, 3) int64 tensor
-            Where the agents stand.
+            Squares to the right, squares to the front and heading of the agents.
         heading : (N,) int64 tensor
-            The way they tried to go.
+            Heading of the attempted move.
         blocked : (N,) bool tensor
-            Whose move was blocked.
+            True if the move was blocked.
 
         Returns
         -------
         (N,) int64 tensor
-            The square ahead, flat; where nothing was blocked or known, the agent's own.
+            Flat index of the square ahead; the agent's own if no move was blocked, or the square
+            lies off the map.
         """
         here = pose[:, :2]
         ahead = here + turned(torch.tensor([[0, 1]]).expand_as(here), heading)

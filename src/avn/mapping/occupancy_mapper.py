@@ -1,4 +1,4 @@
-"""`mapper=occupancy`: a map of beliefs that grows from the start on, located by odometry."""
+"""Mapper `occupancy`, an occupancy map in the frame of the start, localised by odometry."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ if TYPE_CHECKING:
 
 
 class OccupancyMapper(Mapper):
-    """Sees which squares are free, and remembers where it stood and what it ran into.
+    """Mapper that integrates local patches, visited squares and collisions.
 
     Parameters
     ----------
     size : int
-        Squares along each side of the map, odd.
+        Squares along each side of the map, odd, 11 or more.
     """
 
     needs = ("local_patch",)
-    reveals = ("map",)
+    ground_truths = ("map",)
 
     def __init__(self, size: int = 101) -> None:
         self.size = size
 
     def reset(self, n: int, rules: GraphRules) -> None:
-        """Begin N new episodes, each in the middle of an unknown map."""
+        """Begin N new episodes, each in the middle of an unknown map. See `Mapper.reset`."""
         self.map = OccupancyMap(n, self.size)
         self.graph = PartialGraph(n, self.size, rules)
         self.graph.walls = self.map.walls.numpy()
         self._last = torch.zeros(n, 3, dtype=torch.int64)
 
-    def reveal(self, part: str, simulator: Simulator) -> None:
-        """Take in the true map, as seen from each start."""
+    def set_ground_truth(self, part: str, simulator: Simulator) -> None:
+        """Set the true map in the frame of each start. See `Mapper.set_ground_truth`."""
         if part != "map":
-            super().reveal(part, simulator)
-        lattice = torch.from_numpy(simulator.place.grid.lattice).long()
+            super().set_ground_truth(part, simulator)
+        lattice = torch.from_numpy(simulator.scene.grid.lattice).long()
         start, heading = simulator.start // HEADINGS, simulator.start % HEADINGS
         away = lattice[None] - lattice[start][:, None]
         squares = turned(away, -heading % HEADINGS)
@@ -56,49 +56,52 @@ class OccupancyMapper(Mapper):
         self.graph.set(every, self.map.belief.flatten(1))
 
     def belief(self, rows: Tensor) -> Tensor:
-        """What each square is believed to be, (R, M, M)."""
+        """Return the probability that each square is free. See `Mapper.belief`."""
         return torch.sigmoid(self.map.log_odds[rows])
 
-    def observe(self, observation: TensorDict, way: Tensor) -> None:
-        """Locate the agents by odometry and take in what they see and ran into."""
+    def observe(self, observation: TensorDict, direction: Tensor) -> None:
+        """Localise the agents by odometry, and update map and graph. See `Mapper.observe`."""
         pose = observation["odometry"]
-        squares = take_in(self.map, pose, self._last, observation, way, sees=True)
+        squares = update_map(self.map, pose, self._last, observation, direction, sees=True)
         self.graph.set(squares, torch.sigmoid(self.map.log_odds.flatten(1).gather(1, squares)))
         self._last = pose
         self.pose = pose + torch.tensor([self.map.centre, self.map.centre, 0])
         self.location = self.pose[:, :2].double()
 
 
-def take_in(
+def update_map(
     beliefs: OccupancyMap,
     pose: Tensor,
     last: Tensor,
     observation: TensorDict,
-    way: Tensor,
+    direction: Tensor,
     sees: bool,
 ) -> Tensor:
-    """Bring a map up to date with what N agents observe.
+    """Update occupancy maps with the newest observations of N agents.
 
     Parameters
     ----------
     beliefs : OccupancyMap
+        Maps, changed in place.
     pose, last : (N, 3) int64 tensors
-        Where the agents are now, and where they were before the last action.
+        Poses of the agents after and before the last action.
     observation : TensorDict
-        `collided`, and `local_patch` where it sees.
-    way : (N,) int64 tensor
+        `collided`, and `local_patch` if `sees`.
+    direction : (N,) int64 tensor
         See `Mapper.observe`.
     sees : bool
-        Whether the map takes in which squares look free.
+        True if the maps integrate the local patches.
 
     Returns
     -------
     (N, k) int64 tensor
-        The squares that may have changed, laid out flat.
+        Flat indices of the squares that may have changed.
     """
-    stood = beliefs.stand(pose)
-    bumped = beliefs.bump(last, (last[:, 2] + way) % 4, observation["collided"] & (way >= 0))
-    squares = torch.stack((stood, bumped), dim=1)
+    visited = beliefs.mark_visited(pose)
+    collided = beliefs.mark_collision(
+        last, (last[:, 2] + direction) % 4, observation["collided"] & (direction >= 0)
+    )
+    squares = torch.stack((visited, collided), dim=1)
     if sees:
-        squares = torch.cat((squares, beliefs.see(pose, observation["local_patch"])), dim=1)
+        squares = torch.cat((squares, beliefs.integrate(pose, observation["local_patch"])), dim=1)
     return squares

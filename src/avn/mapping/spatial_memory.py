@@ -1,6 +1,7 @@
-"""`mapper=spatial_memory`: pictures are keys, places are values; a place is found by its looks.
+"""Spatial memory: features of views are keys, and their poses are values.
 
-After the key-value memory of Gan et al. (ICRA 2020), section IV-A.
+After the key-value memory of Gan et al., "Look, Listen, and Act: Towards Audio-Visual Embodied
+Navigation" (ICRA 2020), section IV-A.
 """
 
 from __future__ import annotations
@@ -13,44 +14,48 @@ from avn.core.errors import UserError
 
 
 class SpatialMemory:
-    """Pictures that N agents remember, and where each was taken.
+    """Key-value memories of N agents.
 
     Parameters
     ----------
     keys : (W, K, D) float32 tensor
-        l2-normalised features of exploration walks; rows of zeros are empty.
+        l2-normalised features along the exploration trajectories; rows of zeros are empty.
     values : (W, K, 3) int64 tensor
-        Right, front and heading where they were seen.
-    walk : (N,) int64 tensor
-        Which walk each agent remembers.
+        Poses of the views: squares to the right, squares to the front and heading.
+    trajectory_index : (N,) int64 tensor
+        Trajectory of each agent.
     top : int
-        How many entries an estimate is made of.
+        Entries that are retrieved, 1 or more.
 
     Raises
     ------
     UserError
-        Where `top` is less than 1.
+        If `top` is less than 1.
     """
 
-    def __init__(self, keys: Tensor, values: Tensor, walk: Tensor, top: int = 3) -> None:
+    def __init__(
+        self, keys: Tensor, values: Tensor, trajectory_index: Tensor, top: int = 3
+    ) -> None:
         if top < 1:
             raise UserError(f"mapper.top: {top}; give 1 or more entries")
-        self.top, self.walk = top, walk
+        self.top, self.trajectory_index = top, trajectory_index
         self._keys, self._values = keys, values
-        n, features = len(walk), keys.shape[-1]
+        n, features = len(trajectory_index), keys.shape[-1]
         self._own_keys = torch.zeros(n, 0, features)
         self._own_values = torch.zeros(n, 0, 3, dtype=torch.int64)
         self._own = torch.zeros(n, dtype=torch.int64)
 
-    def add(self, features: Tensor, places: Tensor, rows: Tensor) -> None:
-        """Remember one more picture of some agents.
+    def add(self, features: Tensor, poses: Tensor, rows: Tensor) -> None:
+        """Add one entry to the memories of some agents.
 
         Parameters
         ----------
         features : (N, D) float32 tensor
-        places : (N, 3) int64 tensor
+            l2-normalised features of the views.
+        poses : (N, 3) int64 tensor
+            Poses of the views.
         rows : (N,) bool tensor
-            Whose pictures are remembered.
+            Agents whose entry is added.
         """
         chosen = rows.nonzero()[:, 0]
         if not len(chosen):
@@ -60,34 +65,36 @@ class SpatialMemory:
             self._own_keys = torch.nn.functional.pad(self._own_keys, (0, 0, 0, more))
             self._own_values = torch.nn.functional.pad(self._own_values, (0, 0, 0, more))
         self._own_keys[chosen, self._own[chosen]] = features[chosen]
-        self._own_values[chosen, self._own[chosen]] = places[chosen]
+        self._own_values[chosen, self._own[chosen]] = poses[chosen]
         self._own[chosen] += 1
 
     def recall(self, features: Tensor, own: bool = True) -> tuple[Tensor, Tensor]:
-        """The entries whose pictures are most like those that the agents see.
+        """Retrieve the entries most similar to the views of the agents.
 
         Parameters
         ----------
         features : (N, D) float32 tensor
-            l2-normalised.
+            l2-normalised features of the views.
         own : bool
-            Whether what was added counts beside the walks.
+            True to include the entries that `add` added.
 
         Returns
         -------
         similarity : (N, top) float32 tensor
-            Cosine, falling; -inf where the memory has fewer entries.
-        places : (N, top, 3) int64 tensor
+            Cosine similarities in descending order; -inf for missing entries.
+        poses : (N, top, 3) int64 tensor
+            Poses of the entries.
 
         Raises
         ------
         UserError
-            Where a memory has no entry.
+            If a memory has no entry.
         """
         size = self._keys.shape[1]
         likeness = torch.full((len(features), size), -torch.inf)
-        for index in self.walk.unique().tolist():  # a walk that agents share is looked up at once
-            rows = (self.walk == index).nonzero()[:, 0]
+        # agents with the same trajectory share a product
+        for index in self.trajectory_index.unique().tolist():
+            rows = (self.trajectory_index == index).nonzero()[:, 0]
             own_keys = self._keys[index]
             found = features[rows] @ own_keys.T
             empty = ~own_keys.any(dim=-1)
@@ -102,61 +109,64 @@ class SpatialMemory:
                 "(protocol.exploration_steps=400)"
             )
         similarity, entry = likeness.topk(min(self.top, likeness.shape[1]), dim=1)
-        places = self._values[self.walk[:, None], entry.clamp(max=size - 1)]
+        poses = self._values[self.trajectory_index[:, None], entry.clamp(max=size - 1)]
         later = entry >= size
         if bool(later.any()):
             row = torch.arange(len(entry))[:, None].expand_as(entry)
-            places[later] = self._own_values[row[later], entry[later] - size]
-        return similarity, places
+            poses[later] = self._own_values[row[later], entry[later] - size]
+        return similarity, poses
 
 
-def locate(similarity: Tensor, places: Tensor) -> Tensor:
-    """Where N agents are, by what their pictures are like.
+def locate(similarity: Tensor, poses: Tensor) -> Tensor:
+    """Estimate the poses of N agents from retrieved entries.
 
     Parameters
     ----------
     similarity : (N, k) float32 tensor
-        Falling; -inf for no entry.
-    places : (N, k, 3) int64 tensor
+        Cosine similarities in descending order; -inf for missing entries.
+    poses : (N, k, 3) int64 tensor
+        Poses of the entries.
 
     Returns
     -------
     (N, 3) float64 tensor
-        Mean of the locations; the heading that most entries have, of equal ones that of the most
-        similar entry.
+        Mean position, and the most frequent heading; ties go to the most similar entry.
     """
     there = ~similarity.isinf()
     weight = there.double()[..., None]
-    location = (places[..., :2] * weight).sum(dim=1) / weight.sum(dim=1)
-    votes = torch.nn.functional.one_hot(places[..., 2], HEADINGS) * there[..., None]
-    # the first of equals is that of the most similar entry: it has a little more of a vote
+    location = (poses[..., :2] * weight).sum(dim=1) / weight.sum(dim=1)
+    votes = torch.nn.functional.one_hot(poses[..., 2], HEADINGS) * there[..., None]
+    # the most similar entry has a larger vote, which decides ties
     votes = votes.double()
     votes[:, 0] *= 1.5
     return torch.cat((location, votes.sum(dim=1).argmax(dim=1, keepdim=True).double()), dim=1)
 
 
-def distinct(features: Tensor, places: Tensor) -> tuple[Tensor, Tensor]:
-    """Walks as keys and values, each place and heading once.
+def distinct(features: Tensor, poses: Tensor) -> tuple[Tensor, Tensor]:
+    """Collect the distinct poses of each trajectory as keys and values of a memory.
 
     Parameters
     ----------
     features : (W, T, D) float32 tensor
-    places : (W, T, 3) int64 tensor
+        l2-normalised features along the trajectories.
+    poses : (W, T, 3) int64 tensor
+        Poses along the trajectories.
 
     Returns
     -------
     keys : (W, K, D) float32 tensor
-        Filled up with zeros.
+        Features at the first visit of each pose, padded with zeros.
     values : (W, K, 3) int64 tensor
+        Poses, padded with zeros.
     """
     chosen = []
-    for walk in places:
-        _, first = torch.unique(walk, dim=0, return_inverse=True)
-        order = torch.full((int(first.max()) + 1,), len(walk)).scatter_reduce(
-            0, first, torch.arange(len(walk)), "amin"
+    for trajectory in poses:
+        _, first = torch.unique(trajectory, dim=0, return_inverse=True)
+        order = torch.full((int(first.max()) + 1,), len(trajectory)).scatter_reduce(
+            0, first, torch.arange(len(trajectory)), "amin"
         )
         chosen.append(order.sort().values)
     keys = [own[index] for own, index in zip(features, chosen, strict=True)]
-    values = [own[index] for own, index in zip(places, chosen, strict=True)]
+    values = [own[index] for own, index in zip(poses, chosen, strict=True)]
     pad = torch.nn.utils.rnn.pad_sequence
     return pad(keys, batch_first=True), pad(values, batch_first=True)

@@ -143,7 +143,7 @@ def band_weights(rate: int, window: int, bands: int, scale: str) -> Tensor:
     ----------
     rate : int
         Sampling rate in hertz.
-    stft_window : int
+    window : int
         Length of the window in samples.
     bands : int
         Number of bands.
@@ -152,7 +152,7 @@ def band_weights(rate: int, window: int, bands: int, scale: str) -> Tensor:
 
     Returns
     -------
-    (stft_window / 2 + 1, bands) float32 tensor
+    (window / 2 + 1, bands) float32 tensor
         Weights of each bin in each band.
     """
     bins = torch.linspace(0.0, rate / 2, window // 2 + 1, dtype=torch.float64)

@@ -1,0 +1,1 @@
+"""Episodes, protocols, the simulator and the metrics of navigation."""

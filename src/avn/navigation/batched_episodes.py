@@ -1,4 +1,4 @@
-"""N episodes in several apartments that begin anew by themselves, as tensors of numbers."""
+"""N training episodes in several apartments, as a batch of tensors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _KEPT = (
     "state",
     "start",
     "source",
-    "walk",
+    "trajectory_index",
     "sound",
     "realisation",
     "actions",
@@ -28,32 +28,35 @@ _KEPT = (
 
 
 class BatchedEpisodes:
-    """N episodes, each with its source, sound and start.
+    """N episodes, each with its own apartment, source, sound and start.
 
     Parameters
     ----------
-    tables : Tables
-    starts : Starts
-        Where episodes begin.
+    tables : SceneBatch
+        Apartments and their observations.
+    starts : StartSampler
+        Draws source, exploration trajectory and start of each episode.
     n : int
+        Number of episodes.
     protocol : Protocol
-        Which actions there are, and when an episode succeeds.
+        Actions, goal and limits of an episode.
     max_steps : int or None
-        Actions after which an episode is cut off; None for the limits of the protocol.
-    reward : RewardConfig
+        Actions after which an episode is truncated; None for the limits of the protocol.
+    reward : RewardConfig, optional
+        Reward of each action; the default rewards if None.
     seed : int
-        Draws episodes and takes.
+        Seed of the episodes and realisations.
 
     Attributes
     ----------
     state, start, source, sound, realisation : (N,) int64
-        Where the agents are and began, and what they hear.
-    walk : (N,) int64
-        The exploration walk of each episode, counted through all apartments.
+        Current and first state of each agent, and the indices of its source, sound and realisation.
+    trajectory_index : (N,) int64
+        Exploration trajectory of each episode, counted over all apartments.
     actions, attempted : (N,) int64
         Actions and attempted moves in the episode.
     collided : (N,) bool
-        Whether the last action was a blocked move.
+        True if the last action was a blocked move.
     """
 
     def __init__(
@@ -70,7 +73,7 @@ class BatchedEpisodes:
         self.max_steps, self.n = max_steps, n
         self.reward = reward or RewardConfig()
         self.generator = torch.Generator().manual_seed(seed)
-        self.state, self.start, self.source, self.walk, self.sound, self.realisation = (
+        self.state, self.start, self.source, self.trajectory_index, self.sound, self.realisation = (
             torch.zeros(n, dtype=torch.int64) for _ in range(6)
         )
         self.actions, self.attempted = (torch.zeros(n, dtype=torch.int64) for _ in range(2))
@@ -78,12 +81,22 @@ class BatchedEpisodes:
         self.begin(torch.ones(n, dtype=torch.bool))
 
     def begin(self, rows: Tensor) -> None:
-        """Begin new episodes in some rows, (N,) bool; draws for all, so that rows do not matter."""
-        source, walk, start = self.starts.draw(self.n, self.generator)
+        """Begin new episodes in some rows.
+
+        Random numbers are drawn for all rows, so that the generator advances alike for any choice.
+
+        Parameters
+        ----------
+        rows : (N,) bool
+            Rows that begin a new episode.
+        """
+        source, trajectory_index, start = self.starts.draw(self.n, self.generator)
         sound = torch.randint(self.tables.sounds, (self.n,), generator=self.generator)
-        walk = self.tables.source_room[source] * self.starts.walks + walk
+        trajectory_index = (
+            self.tables.source_scene[source] * self.starts.trajectories + trajectory_index
+        )
         self.source = torch.where(rows, source, self.source)
-        self.walk = torch.where(rows, walk, self.walk)
+        self.trajectory_index = torch.where(rows, trajectory_index, self.trajectory_index)
         self.start = torch.where(rows, start, self.start)
         self.state = torch.where(rows, start, self.state)
         self.sound = torch.where(rows, sound, self.sound)
@@ -104,39 +117,39 @@ class BatchedEpisodes:
         -------
         reward : (N,) float32
         terminated, truncated : (N,) bool
-            Whether the episode ended by itself, or was cut off.
+            Episodes that ended under the protocol, and episodes that a limit cut off.
         """
         found = advance(self.tables, self.tables.goal_row[self.source], self.state, actions)
         self.state, self.collided, arrived = found
         self.actions = self.actions + 1
         self.attempted = self.attempted + (actions <= BACKWARD)
-        success, terminated = self.protocol.judged(actions, arrived)
+        success, terminated = self.protocol.judge(actions, arrived)
         self._draw_realisations()
         truncated = self._out_of_time() & ~terminated
         reward = torch.where(self.collided, self.reward.collision, self.reward.step)
         return torch.where(success, self.reward.success, reward), terminated, truncated
 
     def clip(self) -> Tensor:
-        """The row of the clip that each agent hears now, (N,) int64."""
+        """Return the row of the clip that each agent hears now, (N,) int64."""
         return self.tables.clip(ClipId(self.source, self.state, self.sound, self.realisation))
 
     def odometry(self) -> Tensor:
-        """Cells to the right and to the front and quarter turns since the start, (N, 3) int64."""
+        """Return cells right, cells forward and quarter turns since the start, (N, 3) int64."""
         return self.tables.odometry(self.start, self.state)
 
     def state_dict(self) -> dict[str, Any]:
-        """All that goes on changing."""
+        """Return copies of all tensors that change, and the state of the generator."""
         kept: dict[str, Any] = {name: getattr(self, name).clone() for name in _KEPT}
         return kept | {"generator": self.generator.get_state()}
 
     def load_state_dict(self, kept: dict[str, Any]) -> None:
-        """Go on where `state_dict` was taken."""
+        """Restore what `state_dict` returned."""
         for name in _KEPT:
             setattr(self, name, kept[name].clone())
         self.generator.set_state(kept["generator"])
 
     def _draw_realisations(self, rows: Tensor | None = None) -> None:
-        """Let every agent, or those of some rows, hear another take."""
+        """Draw a new realisation for every agent, or for those of some rows."""
         if self.tables.realisations > 1:
             realisations = torch.randint(
                 self.tables.realisations, (self.n,), generator=self.generator
@@ -146,7 +159,7 @@ class BatchedEpisodes:
             )
 
     def _out_of_time(self) -> Tensor:
-        """Whose episodes are cut off after this action, (N,) bool."""
+        """Return the episodes whose limit of actions or moves is reached, (N,) bool."""
         if self.max_steps is not None:
             return self.actions >= self.max_steps
         moves = self.tables.moves[self.tables.goal_row[self.source] + self.start]

@@ -1,4 +1,4 @@
-"""Tables of an apartment under a protocol: how far it is, and what the best walk costs."""
+"""Distances of an apartment under a protocol, and the fewest actions to the goal."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import CELL
 from avn.apartments.grid import Grid
 from avn.core.actions import HEADINGS
-from avn.navigation.place import Place
+from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.protocols import Protocol
 
-# More than any walk costs, and far enough below the limit of int16 to add to.
+# More than the cost of any path, and low enough that sums stay within int16.
 UNREACHABLE = 10_000
 
 
@@ -24,15 +24,15 @@ class Distances:
     Attributes
     ----------
     goal : (K, C) bool
-        Where an agent succeeds.
+        Cells in which an agent succeeds.
     source_moves : (K, C) int64
-        Moves of the shortest walk to the source cell.
+        Moves of the shortest path to the source cell.
     shortest : (K, C) float64
-        The l of SPL, in the protocol's unit.
+        The l of SPL, in moves or metres as the protocol says.
     allowance : (K, C) int64
-        Moves that a walk may take and still have p <= l.
+        Largest number of moves of a path with p <= l.
     crossings : (K, C) int64
-        Least number of borders between rooms on a shortest walk to the source.
+        Least number of room borders on a shortest path to the source.
     """
 
     goal: NDArray[np.bool_]
@@ -42,9 +42,9 @@ class Distances:
     crossings: NDArray[np.int64]
 
 
-def measure(place: Place, protocol: Protocol) -> Distances:
-    """The distances of a place under a protocol."""
-    grid, sources = place.grid, np.asarray(place.sources)
+def measure(scene: NavigationScene, protocol: Protocol) -> Distances:
+    """Compute the distances of a scene under a protocol."""
+    grid, sources = scene.grid, np.asarray(scene.sources)
     goal = protocol.goal_cells(grid, sources)
     source_moves = grid.distances[sources].astype(np.int64)
     if protocol.path_length == "metres":
@@ -57,13 +57,13 @@ def measure(place: Place, protocol: Protocol) -> Distances:
 
 
 def _moves_to(goal: NDArray[np.bool_], grid: Grid) -> NDArray[np.int64]:
-    """Moves to the nearest goal cell, (K, C)."""
+    """Return the moves to the nearest goal cell, (K, C)."""
     nearest = [grid.distances[cells].min(axis=0) for cells in goal]
     return np.stack(nearest).astype(np.int64)
 
 
 def _crossings(grid: Grid, moves: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Least borders between rooms on a shortest walk, (K, C), ring by ring from the source."""
+    """Return the least room borders on a shortest path, (K, C), by distance from the source."""
     neighbours = grid.neighbours
     closer = (neighbours >= 0) & (moves[:, neighbours] == moves[:, :, None] - 1)
     border = (grid.rooms[neighbours] != grid.rooms[:, None]).astype(np.int64)
@@ -77,25 +77,26 @@ def _crossings(grid: Grid, moves: NDArray[np.int64]) -> NDArray[np.int64]:
 def fewest_actions(
     neighbours: NDArray[np.int32], goal: NDArray[np.bool_], moves: int
 ) -> NDArray[np.int16]:
-    """Fewest moves and rotations to the goal, on a walk of at most so many moves.
+    """Compute the fewest moves and rotations to the goal with a limited number of moves.
 
     The agent moves forward or backward and turns by quarters, each of which is one action. The
-    limit on moves keeps a walk from going a longer way round to save turns. Dynamic programming
-    over the moves that are left: at a cell the agent turns to one of four headings, which takes at
-    most two actions, and then moves.
+    limit excludes longer paths that save turns. The method is dynamic programming over the moves
+    that are left: at a cell the agent turns to one of four headings, which takes at most two
+    actions, and then moves.
 
     Parameters
     ----------
     neighbours : (C, 4) int
         The cell to the north, east, south and west, or -1.
     goal : (K, C) bool
+        Goal cells of each source.
     moves : int
-        The largest number of moves that is asked for.
+        Largest number of moves in the table.
 
     Returns
     -------
     (moves + 1, K, 4 C) int16
-        By moves left, goal and state; `UNREACHABLE` or more where the goal is farther.
+        Actions by moves left, source and state; `UNREACHABLE` or more if the goal is farther.
     """
     sources, cells = goal.shape
     ahead = np.where(neighbours >= 0, neighbours, cells)

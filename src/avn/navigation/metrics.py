@@ -1,6 +1,6 @@
-"""Metrics of navigation as the field defines them, and how sure they are.
+"""Metrics of embodied navigation, and bootstrap intervals of their means.
 
-All take arrays of N episodes and give one value an episode; a figure of a table is their mean.
+All metrics take arrays of N episodes and return one value for each; tables show the mean.
 """
 
 from __future__ import annotations
@@ -14,32 +14,67 @@ Floats: TypeAlias = NDArray[np.float64]
 
 
 def spl(success: ArrayLike, path: ArrayLike, shortest: ArrayLike) -> Floats:
-    """Success weighted by path length: S l / max(p, l), (N,).
+    """Compute success weighted by path length (SPL): S l / max(p, l).
 
-    Anderson et al., "On Evaluation of Embodied Navigation Agents", 2018. `path` and `shortest`
-    are in the same unit, and `shortest` is above 0.
+    Anderson et al., "On Evaluation of Embodied Navigation Agents", 2018.
+
+    Parameters
+    ----------
+    success : (N,) array_like
+        S, 1 for success and 0 for failure.
+    path : (N,) array_like
+        p, the length of the path, in the unit of `shortest`.
+    shortest : (N,) array_like
+        l, the length of the shortest path; above 0.
+
+    Returns
+    -------
+    (N,) float64
     """
     taken, best = np.asarray(path, dtype=np.float64), np.asarray(shortest, dtype=np.float64)
     return np.asarray(success, dtype=np.float64) * best / np.maximum(taken, best)
 
 
 def soft_spl(remaining: ArrayLike, path: ArrayLike, shortest: ArrayLike) -> Floats:
-    """SPL with the progress made in place of success: max(0, 1 - d / l) l / max(p, l), (N,).
+    """Compute SoftSPL, SPL with progress in place of success: max(0, 1 - d / l) l / max(p, l).
 
     Datta et al., "Integrating Egocentric Localization for More Realistic Point-Goal Navigation
-    Agents", 2020. `remaining` is d, what is left of the shortest walk at the end, measured as
-    `shortest` is.
+    Agents", 2020.
+
+    Parameters
+    ----------
+    remaining : (N,) array_like
+        d, the length of the shortest path from the last position, in the unit of `shortest`.
+    path : (N,) array_like
+        p, the length of the path, in the unit of `shortest`.
+    shortest : (N,) array_like
+        l, the length of the shortest path from the start; above 0.
+
+    Returns
+    -------
+    (N,) float64
     """
     progress = 1.0 - np.asarray(remaining, dtype=np.float64) / np.asarray(shortest)
     return spl(np.maximum(progress, 0.0), path, shortest)
 
 
 def sna(success: ArrayLike, actions: ArrayLike, fewest: ArrayLike) -> Floats:
-    """Success weighted by number of actions: S a* / max(a, a*), (N,).
+    """Compute success weighted by number of actions (SNA): S a* / max(a, a*).
 
-    Chen et al., "Learning to Set Waypoints for Audio-Visual Navigation", 2021. `actions` counts
-    every action, rotations and Stop included; `fewest` counts the turning that the first heading
-    asks for and Stop where there is one.
+    Chen et al., "Learning to Set Waypoints for Audio-Visual Navigation", 2021.
+
+    Parameters
+    ----------
+    success : (N,) array_like
+        S, 1 for success and 0 for failure.
+    actions : (N,) array_like
+        a, the number of actions, including rotations and Stop.
+    fewest : (N,) array_like
+        a*, the fewest actions that succeed, including rotations and Stop; above 0.
+
+    Returns
+    -------
+    (N,) float64
     """
     return spl(success, actions, fewest)
 
@@ -52,25 +87,26 @@ def cluster_bootstrap(
     level: float = 0.95,
     seed: int = 0,
 ) -> Floats:
-    """Percentile intervals of weighted means, drawing whole clusters with replacement.
+    """Compute percentile intervals of weighted means by a cluster bootstrap.
 
-    Episodes of one source in one room share their fate, so that they are drawn together: an
-    interval over single episodes would be too narrow (Efron and Tibshirani, "An Introduction to
-    the Bootstrap", 1993, chapter 8).
+    Episodes of one source in one scene are correlated, so whole clusters are drawn with
+    replacement; intervals over single episodes would be too narrow (Efron and Tibshirani, "An
+    Introduction to the Bootstrap", 1993, chapter 8).
 
     Parameters
     ----------
     values : (N, M) array_like
-        M figures of each episode; NaN is not allowed.
+        M metrics of each episode, without NaN.
     clusters : (N,) array_like
-        Labels of any kind that sort.
+        Sortable label of the cluster of each episode.
     weights : (N,) array_like, optional
-        Equal by default.
+        Weight of each episode; equal by default.
     draws : int
-        Resamples.
+        Number of resamples.
     level : float
-        Share of resamples inside the interval.
+        Share of resamples inside the interval, 0 to 1.
     seed : int
+        Seed of the resamples.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What can be observed in an apartment: a tensor for each observation, by name."""
+"""Precomputed observations of an apartment: one tensor for each observation, by name."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class SceneObservations:
     Attributes
     ----------
     audio : mapping of str to (K, S, sounds, realisations, ...) tensor
-        What is made of each clip.
+        Features or estimates of each clip.
     visual : mapping of str to (S, ...) tensor
-        What is seen in each state.
+        Features or local patches of the view of each state.
     """
 
     audio: Mapping[str, Tensor] = field(default_factory=dict)
@@ -25,16 +25,27 @@ class SceneObservations:
 
     @property
     def sounds(self) -> int | None:
-        """How many sounds are heard; None where nothing is."""
+        """Number of sounds; None without audio observations."""
         return next((heard.shape[2] for heard in self.audio.values()), None)
 
     @property
     def realisations(self) -> int:
-        """How many realisations there are of each clip; 1 where nothing is heard."""
+        """Number of realisations of each clip; 1 without audio observations."""
         return next((heard.shape[3] for heard in self.audio.values()), 1)
 
     def check(self, sources: int, states: int, sounds: int) -> None:
-        """Raise `ValueError` where a tensor has another shape than the apartment asks for."""
+        """Check the shapes of all tensors.
+
+        Parameters
+        ----------
+        sources, states, sounds : int
+            K, S and the number of sounds of the apartment.
+
+        Raises
+        ------
+        ValueError
+            If a tensor has another shape.
+        """
         wanted = (sources, states, sounds)
         for name, heard in self.audio.items():
             if heard.dim() < 4 or tuple(heard.shape[:3]) != wanted:
@@ -43,7 +54,7 @@ class SceneObservations:
                     f"sounds, realisations, ...) with {wanted} in front"
                 )
         if len({heard.shape[3] for heard in self.audio.values()}) > 1:
-            raise ValueError("what is heard differs in its number of realisations")
+            raise ValueError("the audio observations differ in their number of realisations")
         for name, seen in self.visual.items():
             if len(seen) != states:
                 raise ValueError(f"'{name}' has {len(seen)} rows for {states} states")

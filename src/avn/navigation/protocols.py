@@ -1,4 +1,4 @@
-"""Protocols: when an episode ends, what succeeds, and what a path is measured in."""
+"""Protocols: the goal, the end of an episode and the unit of path length."""
 
 from __future__ import annotations
 
@@ -16,39 +16,45 @@ from avn.core.errors import UserError
 
 GOALS = ("box", "radius")
 PATH_LENGTHS = ("moves", "metres")
-MOST = 100_000  # actions, starts and steps that are still a protocol
+MOST = 100_000  # largest accepted number of actions, starts and steps
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """The rules of an episode.
+    """Rules of an episode.
 
     Attributes
     ----------
     name : str
-        Name of the protocol, as tables have it.
+        Name of the protocol in tables.
     goal : {"box", "radius"}
-        Where an agent succeeds: in the 3 x 3 cells around the source that are at most 2 moves
-        away from it (so that a cell behind a wall does not count), or within `radius` metres of
-        the source along the shortest walk.
+        Goal cells: "box" is the 3 x 3 cells around the source that are at most 2 moves away from
+        it, which excludes cells behind a wall; "radius" is the cells within `radius` metres of
+        the source along the shortest path.
     radius : float
-        Metres, for goal "radius".
+        Radius of the goal "radius", metres, 0 or more.
     requires_stop : bool
-        Whether Stop is an action. If so, it ends the episode, and only Stop at the goal succeeds;
-        if not, arriving there does.
+        True if Stop is an action. Stop then ends the episode, and only Stop at the goal succeeds;
+        otherwise the episode succeeds on arrival at the goal.
     path_length : {"moves", "metres"}
-        What SPL measures. "moves": p is attempted moves, blocked ones too, and l the moves of
-        the shortest walk to the nearest goal cell. "metres": p is metres walked and l the metres
-        of the shortest walk to the source itself. Rotations count in neither.
+        Unit of path length in SPL. "moves": p is the attempted moves, including blocked ones, and
+        l the moves of the shortest path to the nearest goal cell. "metres": p is the metres
+        moved and l the metres of the shortest path to the source cell. Rotations do not count.
     max_moves_ratio : float or None
-        The episode ends when attempted moves reach this many times the shortest moves to the
-        source cell; None for no such cap.
+        Limit of the attempted moves as a multiple of the shortest moves to the source cell, 1 or
+        more; None for no limit.
     max_actions : int
-        The episode ends after so many actions of any kind.
+        Actions of any kind after which the episode ends, 1 to 100,000.
     num_starts : int
-        Episodes of a frozen list for each source and sound.
+        Episodes of a frozen list for each source and sound, 1 to 100,000.
     exploration_steps : int
-        Steps of the exploration walk, whose cells are no starts; 0 for no walk.
+        Actions of the exploration trajectory, whose cells are excluded from the starts; 0 for no
+        exploration.
+
+    Raises
+    ------
+    UserError
+        If a setting is out of range.
     """
 
     name: str
@@ -62,6 +68,7 @@ class Protocol:
     exploration_steps: int = 400
 
     def __post_init__(self) -> None:
+        """Check the settings."""
         for key, value, known in (
             ("goal", self.goal, GOALS),
             ("path_length", self.path_length, PATH_LENGTHS),
@@ -81,34 +88,36 @@ class Protocol:
 
     @property
     def actions(self) -> int:
-        """How many actions there are: 5 with Stop, 4 without; they are numbered from 0."""
+        """Number of actions, 5 with Stop and 4 without; they are numbered from 0."""
         return STOP + 1 if self.requires_stop else STOP
 
     @property
     def counts_turns(self) -> bool:
-        """Whether turning is paid for: where only the number of all actions ends an episode."""
+        """True if rotations count towards the limit, as without a limit of attempted moves."""
         return self.max_moves_ratio is None
 
     def goal_cells(self, grid: Grid, sources: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Where an agent succeeds, (K, C)."""
+        """Return the cells in which an agent succeeds, (K, C) bool."""
         if self.goal == "radius":
-            # A cell that is exactly 1 m away is within 1 m, whatever the rounding.
+            # the tolerance keeps cells at exactly the radius inside
             return grid.distances[sources].astype(np.int64) * CELL <= self.radius + 1e-9
         near: NDArray[np.bool_] = goal_cells(grid)[sources]
         return near
 
-    def judged(self, action: Tensor, arrived: Tensor) -> tuple[Tensor, Tensor]:
-        """Whether an action ends the episode by itself, and whether the agent succeeds with it.
+    def judge(self, action: Tensor, arrived: Tensor) -> tuple[Tensor, Tensor]:
+        """Judge the actions of N agents.
 
         Parameters
         ----------
         action : (N,) int64
+            See `avn.core.actions`.
         arrived : (N,) bool
-            Whether it is at the goal after the action.
+            True if the agent is at the goal after the action.
 
         Returns
         -------
         success, over : (N,) bool
+            Episodes that succeed with the action, and episodes that end with it.
         """
         if not self.requires_stop:
             return arrived, arrived
@@ -116,11 +125,23 @@ class Protocol:
         return arrived & stopped, stopped
 
     def most_moves(self, moves: Tensor) -> Tensor:
-        """Attempted moves that end an episode whose shortest walk to the source has `moves`."""
+        """Return the limit of attempted moves for shortest paths of `moves` moves, (N,) int64."""
         if self.max_moves_ratio is None:
             return torch.full_like(moves, self.max_actions + 1, dtype=torch.int64)
         return torch.ceil(self.max_moves_ratio * moves.double()).long()
 
     def out_of_time(self, actions: Tensor, attempted: Tensor, most_moves: Tensor) -> Tensor:
-        """Which episodes end since actions or attempted moves have been used up, (N,) bool."""
+        """Return the episodes that have reached a limit.
+
+        Parameters
+        ----------
+        actions, attempted : (N,) int64
+            Actions and attempted moves so far.
+        most_moves : (N,) int64
+            Limit of attempted moves; see `most_moves`.
+
+        Returns
+        -------
+        (N,) bool
+        """
         return (actions >= self.max_actions) | (attempted >= most_moves)

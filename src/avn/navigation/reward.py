@@ -1,4 +1,4 @@
-"""The reward of each action, for reinforcement learning."""
+"""Rewards of reinforcement learning."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 @dataclass
 class RewardConfig:
-    """What each action earns: one of the three.
+    """Reward of each action.
 
     Attributes
     ----------
     success : float
-        Where the episode succeeds.
+        Reward of the action with which the episode succeeds.
     collision : float
-        For a move that was blocked.
+        Reward of a blocked move.
     step : float
-        For any other action.
+        Reward of any other action.
     """
 
     success: float = 10.0

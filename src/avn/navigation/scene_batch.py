@@ -1,4 +1,4 @@
-"""Apartments as tables, laid out one after another, in which a step is a lookup."""
+"""Apartments as concatenated tables, in which a step of the simulation is a lookup."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from torch import Tensor
 from avn.core.actions import ACTIONS, BACKWARD, HEADINGS, transitions
 from avn.core.clip_id import ClipId
 from avn.navigation.distances import measure
+from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
 
 # Unit vectors (east, north) to the right and to the front of headings north, east, south, west.
@@ -24,96 +24,99 @@ _FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 @dataclass(frozen=True)
 class SceneBatch:
-    """R apartments with S states in all and Q sources in all; a state counts through all of them.
+    """Tables of R apartments with S states and Q sources in total.
 
-    Everything is a tensor or a plain value, so that it travels to other processes; `share` puts it
-    where they need no copy of their own.
+    States and sources are numbered over all apartments. All attributes are tensors or plain
+    values, so that the batch can be sent to other processes.
 
     Attributes
     ----------
     following : (S * 5,) int64
-        The state that each action leads to.
-    room : (S,) int64
-        The apartment of each state.
+        State after each action.
+    scene : (S,) int64
+        Apartment of each state.
     first_state : (R + 1,) int64
-        Where each apartment's states begin.
-    source_room : (Q,) int64
-        The apartment of each source.
+        First state of each apartment, and S.
+    source_scene : (Q,) int64
+        Apartment of each source.
     goal, goal_row : (...,) bool, (Q,) int64
-        `goal[goal_row[source] + state]`: whether an agent succeeds there.
+        `goal[goal_row[source] + state]` is True if the state is at the goal of the source.
     moves : (...,) int64
-        Moves to the source's cell, as `goal` is laid out.
+        Moves to the cell of the source, in the layout of `goal`.
     clip_row : (Q,) int64
-        Where the clips of each source begin; see `clip`.
+        Row of the first clip of each source; see `clip`.
     sounds, realisations : int
-        How many there are of each clip.
-    places : (4 * S, 3) int64
-        See `positions`.
+        Number of sounds, and of realisations of each clip.
+    poses : (4 * S, 3) int64
+        See `relative_poses`.
     audio : dict of str to (clips, ...) tensor
+        Audio observations of all clips, by name.
     visual : dict of str to (S, ...) tensor
+        Visual observations of all states, by name.
     """
 
     following: Tensor
-    room: Tensor
+    scene: Tensor
     first_state: Tensor
-    source_room: Tensor
+    source_scene: Tensor
     goal: Tensor
     goal_row: Tensor
     moves: Tensor
     clip_row: Tensor
     sounds: int
     realisations: int
-    places: Tensor
+    poses: Tensor
     audio: dict[str, Tensor]
     visual: dict[str, Tensor]
 
     @property
     def states(self) -> int:
-        """S, the states of all apartments."""
-        return len(self.room)
+        """Number of states of all apartments, S."""
+        return len(self.scene)
 
     @property
     def clips_of_state(self) -> int:
-        """Clips of one source in one state."""
+        """Number of clips of one source in one state."""
         return self.sounds * self.realisations
 
     @property
     def clips(self) -> int:
-        """Clips of all sources in all states."""
+        """Number of clips of all sources in all states."""
         return len(self.goal) * self.clips_of_state
 
     def clip(self, clip: ClipId) -> Tensor:
-        """The rows of clips in the tensors of `audio`, (N,) int64."""
+        """Return the rows of clips in the tensors of `audio`, (N,) int64."""
         first = self.clip_row[clip.source] + clip.state * self.clips_of_state
         return first + clip.sound * self.realisations + clip.realisation
 
     def origin(self, start: Tensor) -> tuple[Tensor, Tensor]:
-        """The rows of `places` as seen from starts begin here, and the places of the starts."""
+        """Return the first row of `poses` in the frame of each start, and the pose of the start."""
         frame = start % HEADINGS * self.states
-        return frame, self.places[frame + start]
+        return frame, self.poses[frame + start]
 
     def odometry(
         self, start: Tensor, state: Tensor, origin: tuple[Tensor, Tensor] | None = None
     ) -> Tensor:
-        """How states lie as seen from starts, which broadcast against them.
+        """Return the poses of states relative to starts.
 
         Parameters
         ----------
         start, state : int64 tensors
+            States of the same shape, or shapes that broadcast.
         origin : (Tensor, Tensor), optional
-            What `origin` gave for the starts, to save looking it up at every step.
+            Result of `origin` for the starts, to save the lookup at every step.
 
         Returns
         -------
         (..., 3) int64
-            Cells to the right and to the front and quarter turns clockwise, in the frame of the
-            start.
+            Cells to the right, cells to the front and quarter turns clockwise, in the frame of
+            the start.
         """
         frame, begin = origin or self.origin(start)
-        return self.places[frame + state] - begin
+        return self.poses[frame + state] - begin
 
     def share(self) -> SceneBatch:
-        """Move all tensors to shared memory; returns itself."""
+        """Move all tensors to shared memory, and return the batch itself."""
         for value in vars(self).values():
             for tensor in value.values() if isinstance(value, dict) else [value]:
                 if isinstance(tensor, Tensor):
@@ -124,24 +127,25 @@ class SceneBatch:
 def advance(
     tables: SceneBatch, goal_row: Tensor, state: Tensor, action: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Move N agents by one action: the one rule of motion, for evaluation and for training.
+    """Move N agents by one action, in evaluation and in training alike.
 
     Parameters
     ----------
-    tables : Tables
+    tables : SceneBatch
+        Apartments.
     goal_row, state : (N,) int64
-        `tables.goal_row` of the source that each agent seeks, and where it is.
+        `tables.goal_row` of the source that each agent seeks, and its state.
     action : (N,) int64
         See `avn.core.actions`.
 
     Returns
     -------
     state : (N,) int64
-        Where each is now; a blocked move leads back to where it began.
+        State after the action; a blocked move does not change it.
     blocked : (N,) bool
-        Whether a move was tried and could not be made.
+        True if a move was attempted and blocked.
     arrived : (N,) bool
-        Whether it is now at the goal, whatever it did.
+        True if the agent is at the goal after the action.
     """
     following = tables.following[state * ACTIONS + action]
     blocked = (action <= BACKWARD) & (following == state)
@@ -149,47 +153,57 @@ def advance(
 
 
 def build_scene_batch(
-    places: Sequence[Place],
+    scenes: Sequence[NavigationScene],
     protocol: Protocol,
     observations: Sequence[SceneObservations] = (),
     sounds: int = 1,
 ) -> SceneBatch:
-    """Lay out apartments.
+    """Concatenate the tables of several apartments.
 
     Parameters
     ----------
-    places : sequence of Place
+    scenes : sequence of NavigationScene
+        Apartments.
     protocol : Protocol
-        Where agents succeed.
+        Defines the goal cells.
     observations : sequence of SceneObservations, optional
-        What can be observed in each apartment, the same in all.
+        Observations of each apartment, with the same names in all.
     sounds : int
-        How many sounds there are where nothing is heard.
+        Number of sounds without audio observations.
+
+    Returns
+    -------
+    SceneBatch
+
+    Raises
+    ------
+    ValueError
+        If an observation has another shape than its apartment.
     """
-    observed = [*observations] or [SceneObservations()] * len(places)
-    states = np.cumsum([0] + [HEADINGS * len(place.grid.lattice) for place in places])
+    observed = [*observations] or [SceneObservations()] * len(scenes)
+    states = np.cumsum([0] + [HEADINGS * len(scene.grid.lattice) for scene in scenes])
     sounds, realisations = observed[0].sounds or sounds, observed[0].realisations
-    for place, own, count in zip(places, observed, np.diff(states), strict=True):
-        own.check(len(place.sources), int(count), sounds)
-    distances = [measure(place, protocol) for place in places]
-    sources = [len(place.sources) for place in places]
+    for scene, own, count in zip(scenes, observed, np.diff(states), strict=True):
+        own.check(len(scene.sources), int(count), sounds)
+    distances = [measure(scene, protocol) for scene in scenes]
+    sources = [len(scene.sources) for scene in scenes]
     offsets = torch.from_numpy(states[:-1])
-    source_room = torch.from_numpy(np.repeat(np.arange(len(places)), sources))
+    source_scene = torch.from_numpy(np.repeat(np.arange(len(scenes)), sources))
     # the rows of all sources of an apartment, then those of the next
-    own_states = torch.from_numpy(np.diff(states))[source_room]
-    row = torch.cumsum(own_states, 0) - own_states - offsets[source_room]
+    own_states = torch.from_numpy(np.diff(states))[source_scene]
+    row = torch.cumsum(own_states, 0) - own_states - offsets[source_scene]
     return SceneBatch(
-        following=_laid_out([transitions(p.grid.neighbours) for p in places], offsets),
-        room=torch.from_numpy(np.repeat(np.arange(len(places)), np.diff(states))),
+        following=_laid_out([transitions(s.grid.neighbours) for s in scenes], offsets),
+        scene=torch.from_numpy(np.repeat(np.arange(len(scenes)), np.diff(states))),
         first_state=torch.from_numpy(states),
-        source_room=source_room,
+        source_scene=source_scene,
         goal=_by_state([d.goal for d in distances]),
         goal_row=row,
         moves=_by_state([d.source_moves for d in distances]),
         clip_row=row * sounds * realisations,
         sounds=sounds,
         realisations=realisations,
-        places=_places(places),
+        poses=_poses(scenes),
         audio={
             name: _joined([own.audio[name].flatten(0, 3) for own in observed])
             for name in observed[0].audio
@@ -214,19 +228,29 @@ def _by_state(tables: Sequence[np.ndarray]) -> Tensor:
     return torch.cat([torch.from_numpy(np.repeat(t, HEADINGS, axis=1)).flatten() for t in tables])
 
 
-def _places(places: Sequence[Place]) -> Tensor:
-    each = [positions(p.grid.lattice).unflatten(0, (HEADINGS, -1)) for p in places]
+def _poses(scenes: Sequence[NavigationScene]) -> Tensor:
+    each = [relative_poses(s.grid.lattice).unflatten(0, (HEADINGS, -1)) for s in scenes]
     return torch.cat(each, dim=1).flatten(0, 1)
 
 
-def positions(lattice: NDArray[np.int32]) -> Tensor:
-    """Where a state lies as an agent sees it that faces each heading, (4 x 4 C, 3) int64.
+def relative_poses(lattice: NDArray[np.int32]) -> Tensor:
+    """Compute the pose of every state in the frame of each heading.
 
-    By heading of the beholder and state: cells to the right and to the front from the lattice's
-    origin, and quarter turns clockwise from the beholder's heading.
+    Parameters
+    ----------
+    lattice : (C, 2) int32
+        Column and row of each cell.
+
+    Returns
+    -------
+    (4 * 4 C, 3) int64
+        By heading of the frame and by state: cells to the right and to the front of the lattice's
+        origin, and quarter turns clockwise from the heading of the frame.
     """
     axes = np.stack((_RIGHT, _FRONT), axis=1)
-    place = np.repeat(lattice @ axes.transpose(0, 2, 1), HEADINGS, axis=1)
+    position = np.repeat(lattice @ axes.transpose(0, 2, 1), HEADINGS, axis=1)
     turn = (np.arange(HEADINGS)[None, :] - np.arange(HEADINGS)[:, None]) % HEADINGS
     turns = np.tile(turn, (1, len(lattice)))[:, :, None]
-    return torch.from_numpy(np.concatenate((place, turns), axis=2).reshape(-1, 3).astype(np.int64))
+    return torch.from_numpy(
+        np.concatenate((position, turns), axis=2).reshape(-1, 3).astype(np.int64)
+    )

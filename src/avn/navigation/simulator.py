@@ -1,4 +1,4 @@
-"""The simulator: N episodes in one apartment, moved at once as tensors."""
+"""Simulator of N episodes in one apartment, stepped as a batch."""
 
 from __future__ import annotations
 
@@ -14,55 +14,58 @@ from avn.core.clip_id import ClipId
 from avn.core.random import scramble
 from avn.navigation.distances import Distances, measure
 from avn.navigation.episodes import Episodes
+from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.observations import SceneObservations
-from avn.navigation.place import Place
 from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import advance, build_scene_batch
 
-# Episodes whose takes are drawn at once, so that the 64-bit draws stay in the cache.
+# Episodes whose realisations are drawn at once, so that the 64-bit draws stay in the cache.
 _CHUNK = 256
 
 
 class Simulator:
-    """N episodes of one room that run at once.
+    """Batch of N episodes of one scene.
 
     Parameters
     ----------
-    place : Place
-        The apartment: grid, source cells, lines of sight.
+    scene : NavigationScene
+        Grid, source cells and lines of sight.
     episodes : Episodes
+        Sound, source and start of each episode.
     protocol : Protocol
+        Actions, goal and limits of an episode.
     observations : SceneObservations, optional
-        What can be heard and seen there. Which realisation of a clip an episode hears at a step is
-        drawn from the seed, the episode and the step, whoever walks.
+        Audio and visual observations of the scene. The realisation of a clip at a step is a
+        function of the seed, the episode and the number of actions, for every agent.
 
     Attributes
     ----------
     state, source, sound : (N,) int64
-        Where the agents are, and what they seek. For privileged agents and for records alone.
-    attempted, walked, collisions, actions : (N,) int64
-        Moves tried, moves made, moves blocked, and all actions, Stop included.
-    max_attempts : (N,) tensor
+        State of each agent, and its source and sound; for privileged agents and records only.
+    attempted, moves, collisions, actions : (N,) int64
+        Attempted moves, moves made, blocked moves, and all actions including Stop.
+    max_attempts : (N,) int64
         Attempted moves that end the episode.
     success, stopped, done : (N,) bool
+        Episodes that succeeded, that ended with Stop, and that are over.
 
     Raises
     ------
     ValueError
-        Where an observation has another shape.
+        If an observation has another shape than the scene.
     """
 
     def __init__(
         self,
-        place: Place,
+        scene: NavigationScene,
         episodes: Episodes,
         protocol: Protocol,
         observations: SceneObservations | None = None,
     ) -> None:
-        self.place = place
+        self.scene = scene
         self.episodes = episodes
         self.protocol = protocol
-        self.distances: Distances = measure(place, protocol)
+        self.distances: Distances = measure(scene, protocol)
         self.source = torch.from_numpy(episodes.source)
         self.sound = torch.from_numpy(episodes.sound)
         self.start = torch.from_numpy(episodes.start)
@@ -70,7 +73,7 @@ class Simulator:
         sounds = len(episodes.sounds)
         if observed.sounds not in (None, sounds):
             raise ValueError(f"clips of {observed.sounds} sounds, but episodes of {sounds}")
-        self.tables = build_scene_batch([place], protocol, [observed], sounds)
+        self.tables = build_scene_batch([scene], protocol, [observed], sounds)
         self._goal_row = self.tables.goal_row[self.source]
         self._origin = self.tables.origin(self.start)
         moves = self.tables.moves[self._goal_row + self.start]
@@ -79,15 +82,16 @@ class Simulator:
         self.reset()
 
     def __len__(self) -> int:
+        """Return N."""
         return len(self.start)
 
     @property
-    def walked(self) -> Tensor:
-        """Moves made, (N,) int64."""
+    def moves(self) -> Tensor:
+        """Number of moves made, (N,) int64."""
         return self.attempted - self.collisions
 
     def reset(self) -> TensorDict:
-        """Put every agent back to its start; returns the first observation."""
+        """Put every agent back to its start, and return the first observation."""
         count = len(self)
         self.state = self.start.clone()
         self.attempted, self.collisions, self.actions = (
@@ -99,13 +103,13 @@ class Simulator:
         return self.observe()
 
     def step(self, actions: Tensor) -> TensorDict:
-        """Move every agent whose episode still runs by one action.
+        """Move every agent whose episode is not over by one action.
 
         Parameters
         ----------
         actions : (N,) int64
-            0 forward, 1 backward, 2 rotate left, 3 rotate right, 4 Stop where the protocol has
-            it. Those of finished episodes have no effect.
+            0 forward, 1 backward, 2 rotate left, 3 rotate right, 4 Stop if the protocol has
+            it. Actions of finished episodes have no effect.
 
         Returns
         -------
@@ -115,7 +119,7 @@ class Simulator:
         Raises
         ------
         ValueError
-            Where an action is none of the protocol's, or the shape or type is another.
+            If an action is none of the protocol's, or `actions` has another shape or type.
         """
         self._check(actions)
         running = ~self.done
@@ -125,7 +129,7 @@ class Simulator:
         self.collisions += blocked & running
         self.actions += running
         self._collided = torch.where(running, blocked, self._collided)
-        success, over = self.protocol.judged(actions, arrived)
+        success, over = self.protocol.judge(actions, arrived)
         self.success |= success & running
         if self.protocol.requires_stop:
             self.stopped |= over & running
@@ -134,14 +138,14 @@ class Simulator:
         return self.observe()
 
     def observe(self) -> TensorDict:
-        """What the agents perceive now.
+        """Return the current observations of all agents.
 
         Returns
         -------
         TensorDict of batch size N
-            `collided` (N,) bool, whether the last action was a blocked move; `odometry` (N, 3)
-            int64, cells to the right and to the front and quarter turns clockwise since the start,
-            in the frame of the start; and what is heard and seen, by name.
+            `collided` (N,) bool, True if the last action was a blocked move; `odometry` (N, 3)
+            int64, cells to the right, cells to the front and quarter turns clockwise since the
+            start, in the frame of the start; and the audio and visual observations by name.
         """
         odometry = self.tables.odometry(self.start, self.state, self._origin)
         observation = {"collided": self._collided.clone(), "odometry": odometry}
@@ -151,26 +155,29 @@ class Simulator:
         observation |= {name: seen[self.state] for name, seen in self.tables.visual.items()}
         return TensorDict(observation, batch_size=[len(self)])
 
-    def explored(self) -> tuple[TensorDict, Tensor]:
-        """What is observed on the exploration walks, in silence.
+    def observe_exploration(self) -> tuple[TensorDict, Tensor]:
+        """Return the observations along the exploration trajectories, without audio.
 
         Returns
         -------
-        walks : TensorDict of batch size (W, T)
-            `collided`, `odometry` since the start of the walk, and what is seen, as in `observe`.
-        walk : (N,) int64
-            The walk of each episode.
+        trajectories : TensorDict of batch size (W, T)
+            `collided`, `odometry` since the start of the trajectory, and the visual observations,
+            as in `observe`.
+        trajectory_index : (N,) int64
+            Trajectory of each episode.
         """
-        walks = torch.from_numpy(self.episodes.walks)
+        trajectories = torch.from_numpy(self.episodes.trajectories)
         observed = {
-            "collided": torch.zeros(walks.shape, dtype=torch.bool),
-            "odometry": self.tables.odometry(walks[:, :1], walks),
+            "collided": torch.zeros(trajectories.shape, dtype=torch.bool),
+            "odometry": self.tables.odometry(trajectories[:, :1], trajectories),
         }
-        observed |= {name: seen[walks] for name, seen in self.tables.visual.items()}
-        return TensorDict(observed, batch_size=walks.shape), torch.from_numpy(self.episodes.walk)
+        observed |= {name: seen[trajectories] for name, seen in self.tables.visual.items()}
+        return TensorDict(observed, batch_size=trajectories.shape), torch.from_numpy(
+            self.episodes.trajectory_index
+        )
 
     def clip(self) -> ClipId:
-        """Which clip each agent hears now; the realisation is drawn anew for every action."""
+        """Return the clip that each agent hears now; each action has its own realisation."""
         if self._realisations is None:
             first = torch.zeros_like(self.state)
             return ClipId(self.source, self.state, self.sound, first)
@@ -202,9 +209,22 @@ class Simulator:
 def drawn_realisations(
     episodes: Episodes, draws: int, realisations: int, rows: Sequence[int] | None = None
 ) -> Tensor:
-    """The take that each episode hears after each number of actions, (N, draws) int16.
+    """Draw the realisation that each episode hears after each number of actions.
 
-    `rows` are the episodes that are asked for, where not all.
+    Parameters
+    ----------
+    episodes : Episodes
+        Their keys determine the draws.
+    draws : int
+        Numbers of actions, counted from 0.
+    realisations : int
+        Realisations of each clip.
+    rows : sequence of int, optional
+        Episodes to draw for; all by default.
+
+    Returns
+    -------
+    (N, draws) int16 tensor
     """
     keys, steps = episodes.keys(), np.arange(draws)
     keys = keys if rows is None else keys[rows]

@@ -1,4 +1,4 @@
-"""Where training episodes begin: drawn among all states that a source and a walk allow."""
+"""Random starts of training episodes, uniform over the allowed states."""
 
 from __future__ import annotations
 
@@ -13,60 +13,75 @@ from avn.navigation.scene_batch import SceneBatch
 
 @dataclass(frozen=True)
 class StartSampler:
-    """For each source and walk, the states in which an episode may begin.
+    """Allowed first states of episodes, a list for each source and exploration trajectory.
 
     Attributes
     ----------
-    walks : int
-        Exploration walks of each apartment; 1 where nothing is explored.
+    trajectories : int
+        Number of exploration trajectories of each apartment; 1 without exploration.
     states : (...,) int64
-        All lists, one after another.
-    first, count : (Q * walks,) int64
-        Where each list begins, and how long it is.
+        Concatenated lists.
+    first, count : (Q * trajectories,) int64
+        First index and length of each list.
     """
 
-    walks: int
+    trajectories: int
     states: Tensor
     first: Tensor
     count: Tensor
 
     def draw(self, n: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
-        """Source, walk of the source's apartment and start of N episodes, (N,) int64 each.
+        """Draw source, exploration trajectory and start of N episodes, each uniformly.
 
-        A source is drawn, then a walk, then a start, each uniformly.
+        Parameters
+        ----------
+        n : int
+            Number of episodes.
+        generator : torch.Generator
+            Source of the random numbers.
+
+        Returns
+        -------
+        source, trajectory_index, start : (N,) int64
+            The trajectory is counted within the apartment of the source.
         """
-        source = torch.randint(len(self.first) // self.walks, (n,), generator=generator)
-        walk = torch.randint(self.walks, (n,), generator=generator)
-        which = source * self.walks + walk
-        place = (torch.rand(n, generator=generator) * self.count[which]).long()
-        return source, walk, self.states[self.first[which] + place]
+        source = torch.randint(len(self.first) // self.trajectories, (n,), generator=generator)
+        trajectory_index = torch.randint(self.trajectories, (n,), generator=generator)
+        which = source * self.trajectories + trajectory_index
+        index = (torch.rand(n, generator=generator) * self.count[which]).long()
+        return source, trajectory_index, self.states[self.first[which] + index]
 
 
 def build_start_sampler(tables: SceneBatch, visited: Tensor | None = None) -> StartSampler:
-    """The lists of an apartment's tables.
+    """Collect the allowed starts of each source and exploration trajectory.
 
     Parameters
     ----------
-    tables : Tables
-    visited : (R, walks, S) bool tensor, optional
-        States whose cells an exploration walk of each apartment has visited; a start is elsewhere,
-        where the walk leaves any.
+    tables : SceneBatch
+        Apartments.
+    visited : (R, W, S) bool tensor, optional
+        States whose cells each exploration trajectory has visited. Starts exclude them, unless
+        no other state is left.
+
+    Returns
+    -------
+    StartSampler
 
     Raises
     ------
     UserError
-        Where a source has no start.
+        If a source has no start.
     """
-    walks = 1 if visited is None else visited.shape[1]
+    trajectories = 1 if visited is None else visited.shape[1]
     lists = []
-    for source, room in enumerate(tables.source_room.tolist()):
-        low, high = tables.first_state[room : room + 2].tolist()
+    for source, scene in enumerate(tables.source_scene.tolist()):
+        low, high = tables.first_state[scene : scene + 2].tolist()
         states = torch.arange(low, high)
         away = ~tables.goal[tables.goal_row[source] + states]
         if not bool(away.any()):
             raise UserError("split: an apartment is so small that every cell is at the goal")
-        for walk in range(walks):
-            fresh = away if visited is None else away & ~visited[room, walk, low:high]
+        for trajectory_index in range(trajectories):
+            fresh = away if visited is None else away & ~visited[scene, trajectory_index, low:high]
             lists.append(states[fresh if bool(fresh.any()) else away])
     count = torch.tensor([len(own) for own in lists])
-    return StartSampler(walks, torch.cat(lists), torch.cumsum(count, 0) - count, count)
+    return StartSampler(trajectories, torch.cat(lists), torch.cumsum(count, 0) - count, count)

@@ -1,4 +1,4 @@
-"""Traces: what happened in an episode step by step, and what the agent took to be true."""
+"""Traces of episodes step by step, with the beliefs of the agent."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.actions import HEADINGS
-from avn.navigation.place import Place
+from avn.navigation.navigation_scene import NavigationScene
 
 
 @dataclass(frozen=True)
 class BeliefTrace:
-    """What an agent with a map took to be true at each of T steps, in the apartment's own frame.
+    """Beliefs of an agent with a map at each of T steps, in the frame of the apartment.
 
     Attributes
     ----------
     pose : (T, 3) float64
-        East and north in metres, and heading, where it took itself to be.
+        Estimated pose: metres east, metres north and heading.
     low : (2,) int64
         Lattice indices (x, y) of the first square of `free`.
     free : (T, H, W) uint8, or None
-        How surely each square is free, 0 to 255, by y and x; 128 tells nothing.
+        Probability that each square is free, scaled to 0 to 255, by y and x; 128 is unknown.
     similarity : (T, k) float32, or None
-        Cosine of what it saw and the entries that its memory returned.
+        Cosine similarity of the view and the entries that the spatial memory returned.
     retrieved : (T, k, 3) float64, or None
-        East, north and heading of these entries.
+        Metres east, metres north and heading of these entries.
     """
 
     pose: NDArray[np.float64]
@@ -40,31 +40,33 @@ class BeliefTrace:
 
 @dataclass(frozen=True)
 class Trace:
-    """An episode of T actions.
+    """Trace of an episode of T actions.
 
     Attributes
     ----------
-    place : Place
+    scene : NavigationScene
+        Apartment of the episode.
     record : mapping
-        Its row of `episodes.csv`.
+        Row of `episodes.csv`.
     sound, source : int
-        Index into the run's sounds and the place's sources.
+        Index into the sounds of the run and into the sources of the scene.
     state : (T + 1,) int64
-        4 x cell + heading; the last is where it ended.
+        4 x cell + heading, from the start to the last state.
     action : (T,) int64
+        See `avn.core.actions`.
     collided : (T + 1,) bool
-        Whether the action before was a blocked move.
+        True if the action before was a blocked move.
     realisation : (T + 1,) int64
-        Which take of the clip of source, state and sound is heard.
+        Realisation of the clip that is heard.
     source_estimates : (T + 1, 2) float64, or None
-        East and north in metres of where the sound network took the source to be.
+        Location of the source as the sound network estimates it, metres east and north.
     beliefs : BeliefTrace, or None
-        Of an agent with a map.
-    walk : (W,) int64, or None
-        States of the exploration walk, where the agent was shown one.
+        Beliefs of an agent with a map.
+    exploration_trajectory : (W,) int64, or None
+        States of the exploration trajectory of an agent that explores.
     """
 
-    place: Place
+    scene: NavigationScene
     record: Mapping[str, Any]
     sound: int
     source: int
@@ -74,14 +76,14 @@ class Trace:
     realisation: NDArray[np.int64]
     source_estimates: NDArray[np.float64] | None
     beliefs: BeliefTrace | None
-    walk: NDArray[np.int64] | None
+    exploration_trajectory: NDArray[np.int64] | None
 
     @property
     def path(self) -> NDArray[np.float64]:
-        """East and north in metres at each step, (T + 1, 2)."""
-        return self.place.grid.centres[self.state // HEADINGS]
+        """Positions at each step, metres east and north, (T + 1, 2)."""
+        return self.scene.grid.centres[self.state // HEADINGS]
 
     @property
     def goal(self) -> NDArray[np.float64]:
-        """East and north of the source, (2,)."""
-        return self.place.grid.centres[self.place.sources[self.source]]
+        """Position of the source, metres east and north, (2,)."""
+        return self.scene.grid.centres[self.scene.sources[self.source]]

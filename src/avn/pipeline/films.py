@@ -105,5 +105,5 @@ def _write(run: Run, paths: dict[int, Path]) -> None:
     observations = RunObservations(run)
     for trace, path in zip(replay.traces(run, list(paths)), paths.values(), strict=True):
         clips = observations.clips(trace)
-        views = observations.views(trace.place.name, trace.state)
+        views = observations.views(trace.scene.name, trace.state)
         write_film(path, trace, str(run.cfg.agent.name), views, clips, soundtrack(clips))

@@ -61,7 +61,7 @@ class RunObservations:
 
     def clips(self, trace: Trace) -> Tensor:
         """Return the clip of each step, (T + 1, 2, rate) float32, left and right ear."""
-        brirs = self._scenes[trace.place.name].brirs
+        brirs = self._scenes[trace.scene.name].brirs
         state, realisation = torch.from_numpy(trace.state), torch.from_numpy(trace.realisation)
         parts = []
         for states, realisations in zip(

@@ -38,7 +38,7 @@ from avn.pipeline.sound_network import has_sound_model
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.trained import METRICS, Trained
 from avn.rl.algorithm import Algorithm
-from avn.rl.exploration_memory import draw_walks
+from avn.rl.exploration_memory import draw_trajectories
 from avn.rl.networks import ActorCritic, NetworkSpec
 from avn.rl.training import BEST, MONITOR, Training, load_network
 from avn.rl.worker import TrainingSpec
@@ -143,7 +143,7 @@ class Policy(Trained):
         UserError
             Where a checkpoint belongs to another config, or has changed since it was trained.
         """
-        network = ActorCritic(_shape(self.cfg, self._feature_sizes()))
+        network = ActorCritic(_network_spec(self.cfg, self._feature_sizes()))
         load_network(network, self.folder / BEST, self.fingerprint)
         self.check_weights()
         return network.eval()
@@ -157,7 +157,7 @@ class Policy(Trained):
         return {str(name): int(size) for name, size in sizes.items()}
 
 
-def _shape(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
+def _network_spec(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
     protocol: Protocol = build_object("protocol", cfg.protocol)
     return NetworkSpec(
         features=features,
@@ -176,9 +176,9 @@ def _train(policy: Policy) -> None:
     opened = {subset: load_subset(cfg, subset) for subset in SUBSETS}
     tables = tables_of(cfg, opened["train"])
     features = _sizes(tables)
-    shape = _shape(cfg, features)
+    network_spec = _network_spec(cfg, features)
     torch.manual_seed(recipe.train_seed)
-    network = ActorCritic(shape)
+    network = ActorCritic(network_spec)
     for name in features:
         table = tables.visual.get(name, tables.audio.get(name))
         assert table is not None
@@ -187,11 +187,11 @@ def _train(policy: Policy) -> None:
     spec = TrainingSpec(
         tables=tables,
         protocol=protocol,
-        shape=shape,
+        network_spec=network_spec,
         recipe=recipe,
         buffers=dict(network.named_buffers()),
         map_size=cfg.mapper.size,
-        walks=_walks(cfg, opened["train"][0], tables),
+        trajectories=_trajectories(cfg, opened["train"][0], tables),
         top=cfg.baseline.top,
     )
     measure = Measure(cfg, opened, protocol)
@@ -216,11 +216,11 @@ def _sizes(tables: SceneBatch) -> dict[str, int]:
     }
 
 
-def _walks(cfg: DictConfig, scenes: Sequence[Scene], tables: SceneBatch) -> Tensor | None:
+def _trajectories(cfg: DictConfig, scenes: Sequence[Scene], tables: SceneBatch) -> Tensor | None:
     if not cfg.baseline.memory:
         return None
     steps = cfg.protocol.exploration_steps
-    return draw_walks(
+    return draw_trajectories(
         [*scenes], tables, cfg.algorithm.exploration_walks, steps, cfg.algorithm.train_seed
     )
 

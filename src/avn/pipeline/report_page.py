@@ -232,14 +232,14 @@ class _Media:
 
     @staticmethod
     def _key(trace: Trace) -> str:
-        return str(getattr(trace.place, "folder", trace.place.name))
+        return str(getattr(trace.scene, "folder", trace.scene.name))
 
     def _plan(self, trace: Trace) -> int:
         """Return the number of an apartment's plan; embed the plan where it is new."""
         place = self._key(trace)
         if place not in self._plan_of:
             self._plan_of[place] = len(self.plans)
-            self.plans.append(page_media.plan_of_place(trace.place))
+            self.plans.append(page_media.scene_plan(trace.scene))
         return self._plan_of[place]
 
     def _view(
@@ -248,7 +248,7 @@ class _Media:
         key = (place, name, state)
         if key not in self._view_of:
             self._view_of[key] = len(self.views)
-            (view,) = observations.views(trace.place.name, [state])
+            (view,) = observations.views(trace.scene.name, [state])
             self.views.append(page_media.view_url(view))
         return self._view_of[key]
 

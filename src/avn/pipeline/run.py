@@ -172,7 +172,7 @@ class Evaluation(Stage):
         observations = self.observed.load(scenes)
         episodes = pd.concat(rollout_scenes(cfg, scenes, observations), ignore_index=True)
         protocol: Protocol = build_object("protocol", cfg.protocol)
-        walks = [episodes_of(cfg, scene, protocol).walks for scene in scenes]
+        walks = [episodes_of(cfg, scene, protocol).trajectories for scene in scenes]
         perception_tables.write(self.observed, scenes, walks, observations, folder)
         summary = results.summarise(episodes)
         _log(cfg, folder, summary)

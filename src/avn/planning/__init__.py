@@ -1,0 +1,1 @@
+"""Planning: partial graphs, shortest paths and the belief of the source."""

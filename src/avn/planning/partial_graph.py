@@ -1,7 +1,7 @@
-"""The partial graph: what N agents know of the squares round them, as nodes and edges.
+"""Partial graph: the knowledge of N agents about the squares around them, as nodes and edges.
 
-The nodes are squares of a map, and an edge joins neighbours. Squares of which nothing is known
-count as free; one that is found blocked loses its node, and with it its edges.
+The nodes are squares of a map, and edges join neighbours. Unknown squares count as free; a blocked
+square has no node and no edges.
 """
 
 from __future__ import annotations
@@ -18,22 +18,28 @@ from avn.core.errors import UserError
 
 @dataclass(frozen=True)
 class GraphRules:
-    """How beliefs become nodes and edges.
+    """Rules that turn the probabilities of a map into nodes and costs.
 
     Attributes
     ----------
     obstacle_threshold : float
-        Squares that are believed to be free by less than this are no nodes; at most 0.5, so that
-        unknown squares are.
+        Squares whose probability of being free is below this are no nodes, 0 to 0.5. Unknown
+        squares have probability 0.5 and are nodes.
     collision_cost : float
-        Moves that running into a blocked square costs, so that entering a square that is free by
-        p costs 1 + detour (1 - p).
+        Cost of a collision, moves, 0 to 1000. Entering a square that is free with probability p
+        costs 1 + `collision_cost` (1 - p).
+
+    Raises
+    ------
+    UserError
+        If a setting is out of range.
     """
 
     obstacle_threshold: float = 0.5
     collision_cost: float = 0.0
 
     def __post_init__(self) -> None:
+        """Check the settings."""
         if not 0 <= self.obstacle_threshold <= 0.5:
             raise UserError(
                 f"planner.obstacle_threshold: {self.obstacle_threshold}; give 0 to 0.5, for an "
@@ -44,20 +50,22 @@ class GraphRules:
 
 
 class PartialGraph:
-    """Nodes and edges of N agents on M x M squares.
+    """Nodes and edges of N agents on M x M squares each.
 
     Parameters
     ----------
     n, size : int
+        N and M.
     rules : GraphRules
+        Threshold and costs.
 
     Attributes
     ----------
     cost : (N, M, M) float32
-        What entering a square costs; infinite where there is no node. By square to the front and
-        to the right.
+        Cost of entering a square, moves; infinite without a node. By square to the front and
+        square to the right.
     walls : (N, M, M) uint8
-        Bit h is set where there is no edge along heading h.
+        Bit h is set if there is no edge along heading h.
     """
 
     def __init__(self, n: int, size: int, rules: GraphRules) -> None:
@@ -68,16 +76,16 @@ class PartialGraph:
         self.walls: NDArray[np.uint8] = np.zeros((n, size, size), dtype=np.uint8)
 
     def set(self, squares: Tensor, belief: Tensor, rows: Tensor | None = None) -> None:
-        """Give squares the cost that follows from what is believed of them.
+        """Set the costs of some squares from the probability that they are free.
 
         Parameters
         ----------
         squares : (N, k) int64 tensor
-            Squares of each agent's map, laid out flat.
+            Flat indices of squares of each agent's map.
         belief : (N, k) float32 tensor
             Probability that they are free.
         rows : (N,) int64 tensor, optional
-            Whose maps, where not those of all agents.
+            Numbers of the agents; all by default.
         """
         costs = 1 + self.rules.collision_cost * (1 - belief)
         costs = torch.where(belief < self.rules.obstacle_threshold, torch.inf, costs)

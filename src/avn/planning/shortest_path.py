@@ -1,9 +1,9 @@
-"""Shortest paths on N partial graphs at once: Dijkstra's algorithm with a lower bound.
+"""Shortest paths on N partial graphs: A* search.
 
-The nodes of a graph are squares of a map with a heading each. The bound on what is left, the
-moves along both axes, never overestimates and is consistent, so that the path found is the one that
-Dijkstra's algorithm finds (Hart, Nilsson and Raphael, "A Formal Basis for the Heuristic
-Determination of Minimum Cost Paths", 1968); it only looks at fewer nodes.
+The nodes are squares of a map with a heading each. The heuristic, the moves along both axes, is
+consistent, so the paths have the cost that Dijkstra's algorithm finds, while fewer nodes are
+expanded (Hart, Nilsson and Raphael, "A Formal Basis for the Heuristic Determination of Minimum Cost
+Paths", 1968).
 """
 
 from __future__ import annotations
@@ -26,46 +26,46 @@ def first_actions(
     walls: NDArray[np.uint8],
     pose: NDArray[np.int64],
     target: NDArray[np.int64],
-    aim: NDArray[np.float64],
+    fallback: NDArray[np.float64],
     turn: float,
     back: float,
-    running: NDArray[np.bool_],
+    active: NDArray[np.bool_],
     reach: int = 0,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
-    """The first action of each agent's shortest path to its target.
+    """Find the first action of each agent's shortest path to its target.
 
-    Where a target cannot be reached, the path leads to the node nearest to `aim` that can.
+    If a target cannot be reached, the path leads to the reachable node nearest to `fallback`.
 
     Parameters
     ----------
     cost : (N, M, M) float32
-        What entering each square costs, 1 or more; infinite where there is no node. By square to
-        the front and square to the right.
+        Cost of entering each square, 1 or more; infinite without a node. By square to the front
+        and square to the right.
     walls : (N, M, M) uint8
-        Bit h is set where there is no edge along heading h.
+        Bit h is set if there is no edge along heading h.
     pose : (N, 3) int64
-        Column, row and heading of the agents, counted from the map's corner.
+        Column, row and heading of the agents, counted from the corner of the map.
     target : (N, 2) int64
-        Column and row where each path shall end.
-    aim : (N, 2) float64
-        The place that a path comes as near to as it can where the target is out of reach.
+        Column and row of the end of each path.
+    fallback : (N, 2) float64
+        Column and row that the path approaches if the target cannot be reached.
     turn : float
-        What a quarter turn costs.
+        Cost of a quarter turn.
     back : float
-        What a step backward costs more than one forward; infinite for none.
-    running : (N,) bool
-        Whose action is asked for.
-    stop_probability : int
-        A path may end so many squares from its target, diagonals included.
+        Additional cost of a move backward; infinite to exclude it.
+    active : (N,) bool
+        Agents to plan for.
+    reach : int
+        Squares, including diagonals, that the end of a path may lie from its target.
 
     Returns
     -------
     action : (N,) int64
-        -1 where the agent is there, as near as it can come, or does not run.
+        First action; -1 if the path has none or the agent is not active.
     length : (N,) float64
         Cost of the path.
     end : (N, 2) int64
-        Where it ends.
+        Column and row of its end.
     """
     count, size = cost.shape[0], cost.shape[1]
     action = np.full(count, NO_ACTION, dtype=np.int64)
@@ -75,10 +75,10 @@ def first_actions(
     first = np.full(size * size * 4, NO_ACTION, dtype=np.int8)
     touched = np.empty(size * size * 4, dtype=np.int64)
     for n in range(count):
-        if running[n]:
+        if active[n]:
             how = (turn, back, reach)
             action[n], length[n], reached, used = _search(
-                cost[n], walls[n], pose[n], target[n], aim[n], how, best, first, touched
+                cost[n], walls[n], pose[n], target[n], fallback[n], how, best, first, touched
             )
             end[n, 0], end[n, 1] = reached % size, reached // size
             for i in range(used):
@@ -87,7 +87,7 @@ def first_actions(
 
 
 @numba.njit(cache=True)
-def _search(cost, walls, pose, target, aim, how, best, first, touched):  # type: ignore[no-untyped-def]
+def _search(cost, walls, pose, target, fallback, how, best, first, touched):  # type: ignore[no-untyped-def]
     turn, back, reach = how
     size = cost.shape[0]
     start = (pose[1] * size + pose[0]) * 4 + pose[2]
@@ -103,7 +103,7 @@ def _search(cost, walls, pose, target, aim, how, best, first, touched):  # type:
         x, y = square % size, square // size
         if abs(x - target[0]) <= reach and abs(y - target[1]) <= reach:
             return first[node], so_far, square, used
-        away = (x - aim[0]) ** 2 + (y - aim[1]) ** 2
+        away = (x - fallback[0]) ** 2 + (y - fallback[1]) ** 2
         if away < nearest:
             nearest, found, found_length = away, node, so_far
         for move in range(4):

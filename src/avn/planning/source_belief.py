@@ -1,4 +1,4 @@
-"""Where N agents look for the source: what they heard, and where they were in vain."""
+"""Belief of N agents about the position of the source."""
 
 from __future__ import annotations
 
@@ -15,24 +15,30 @@ FILTERS = ("latest", "bayes")
 
 @dataclass
 class SourceErrorModel:
-    """How far an estimate of the sound network is trusted, for `source_filter=bayes`.
+    """Error model of the source estimates, for `source_filter=bayes`.
 
-    An estimate r metres away stands for a normal distribution with the standard deviation
-    `sigma` + `sigma_per_metre` r. A part `front_back_prob` of the weight lies on its mirror image
-    behind the agent, for ears confuse front and back, and `outlier_prob` lies anywhere.
+    The likelihood of an estimate r metres away is a Gaussian with the standard deviation
+    `sigma` + `sigma_per_metre` r, its mirror image behind the agent with the weight
+    `front_back_prob`, for confusions of front and back, and the constant `outlier_prob`.
 
     Attributes
     ----------
     sigma : float
-        Metres of the standard deviation that do not depend on the distance.
+        Standard deviation at distance 0, metres, more than 0 and up to 100.
     sigma_per_metre : float
-        Part of the distance that is added to the standard deviation.
+        Increase of the standard deviation for each metre of distance, 0 to 100.
     front_back_prob : float
-        Part of the weight that lies on the mirror image behind the agent.
+        Weight of the mirror image behind the agent, 0 or more and below 1.
     outlier_prob : float
-        Part of the weight that lies anywhere.
+        Constant part of the likelihood, for outliers, more than 0 and up to 100.
     weight : float
-        What one estimate counts; less than 1, since the errors of one place repeat.
+        Factor of the log-likelihood of each estimate, 0 to 100; below 1 because the errors of
+        nearby estimates are correlated.
+
+    Raises
+    ------
+    UserError
+        If a setting is out of range.
     """
 
     sigma: float = 0.5
@@ -42,6 +48,7 @@ class SourceErrorModel:
     weight: float = 0.5
 
     def __post_init__(self) -> None:
+        """Check the settings."""
         for key in ("sigma", "sigma_per_metre", "front_back_prob", "outlier_prob", "weight"):
             if not 0 <= getattr(self, key) <= 100:
                 raise UserError(f"planner.error.{key}: {getattr(self, key)}; give 0 to 100")
@@ -52,22 +59,29 @@ class SourceErrorModel:
 
 
 class SourceBelief:
-    """What N agents believe about the place of the source, on M x M squares each.
+    """Belief of N agents about the position of the source, on M x M squares each.
 
     Parameters
     ----------
     n, size : int
+        N and M.
     source_filter : {"latest", "bayes"}
-        The newest estimate alone, as in the paper, or the product of all of them.
-    error : HearingError
-        For "bayes".
+        "latest" uses the newest estimate alone, as in the paper; "bayes" multiplies the
+        likelihoods of all estimates.
+    error : SourceErrorModel
+        Error model of the estimates, for "bayes".
 
     Attributes
     ----------
-    aim : (N, 2) float64
-        Where the source is taken to be: column and row, counted from the map's corner.
+    source_estimate : (N, 2) float64
+        Newest estimate: column and row, counted from the corner of the map.
     searched : (N, M, M) bool
-        Squares where the source is not.
+        Squares that do not hold the source.
+
+    Raises
+    ------
+    UserError
+        If `source_filter` is unknown.
     """
 
     def __init__(self, n: int, size: int, source_filter: str, error: SourceErrorModel) -> None:
@@ -76,70 +90,97 @@ class SourceBelief:
                 f"planner.source_filter: '{source_filter}' is none of {', '.join(FILTERS)}"
             )
         self.source_filter, self.error = source_filter, error
-        self.aim = np.full((n, 2), size // 2, dtype=np.float64)
+        self.source_estimate = np.full((n, 2), size // 2, dtype=np.float64)
         self.searched = np.zeros((n, size, size), dtype=np.bool_)
         cells = size if source_filter == "bayes" else 0
         self._log_belief = np.zeros((n, cells, cells), dtype=np.float32)
 
-    def listen(
+    def update(
         self,
-        place: NDArray[np.int64],
-        aim: NDArray[np.float64],
-        mirrored: NDArray[np.float64],
-        running: NDArray[np.bool_],
+        position: NDArray[np.int64],
+        source_estimate: NDArray[np.float64],
+        mirror_image: NDArray[np.float64],
+        active: NDArray[np.bool_],
     ) -> None:
-        """Take in the newest estimates.
+        """Update the belief with the newest estimates.
 
         Parameters
         ----------
-        place : (N, 2) int64
-            Column and row where the agents stand.
-        aim, mirrored : (N, 2) float64
-            The estimate, and its mirror image behind the agent, as column and row.
-        running : (N,) bool
-            Who listens.
+        position : (N, 2) int64
+            Column and row of the agents.
+        source_estimate, mirror_image : (N, 2) float64
+            Column and row of the estimate, and of its mirror image behind the agent.
+        active : (N,) bool
+            Agents to update.
         """
-        self.aim = np.where(running[:, None], aim, self.aim)
+        self.source_estimate = np.where(active[:, None], source_estimate, self.source_estimate)
         if self.source_filter == "bayes":
             e = self.error
             own = (e.sigma, e.sigma_per_metre, e.front_back_prob, e.outlier_prob, e.weight)
-            _weigh(self._log_belief, place, aim, mirrored, running, own)
+            _weigh(self._log_belief, position, source_estimate, mirror_image, active, own)
 
-    def rule_out(self, place: NDArray[np.int64], reach: int, rows: NDArray[np.bool_]) -> None:
-        """Note that the source is not within `reach` squares of agents, diagonals included."""
+    def rule_out(self, position: NDArray[np.int64], reach: int, rows: NDArray[np.bool_]) -> None:
+        """Mark the squares around agents as searched.
+
+        Parameters
+        ----------
+        position : (N, 2) int64
+            Column and row of the agents.
+        reach : int
+            Squares around the agent, including diagonals.
+        rows : (N,) bool
+            Agents to update.
+        """
         chosen = np.flatnonzero(rows)
         size = self.searched.shape[1]
         around = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 2), -1).reshape(-1, 2)
-        squares = np.clip(place[chosen, None] + around, 0, size - 1)
+        squares = np.clip(position[chosen, None] + around, 0, size - 1)
         self.searched[chosen[:, None], squares[..., 1], squares[..., 0]] = True
 
-    def targets(self, cost: NDArray[np.float32], running: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """The node where each agent now looks for the source, (N, 2) column and row.
+    def targets(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Choose the node where each agent looks for the source next.
 
-        Of the nodes that were not searched, the one nearest to the newest estimate, or the one
-        believed most. Where all were searched, the search begins anew.
+        It is the unsearched node nearest to the newest estimate, or the most likely one for
+        "bayes". If all nodes were searched, the search begins again.
+
+        Parameters
+        ----------
+        cost : (N, M, M) float32
+            See `PartialGraph`.
+        active : (N,) bool
+            Agents to choose for.
+
+        Returns
+        -------
+        (N, 2) int64
+            Column and row.
         """
         if self.source_filter == "bayes":
-            found, there = _likeliest(self._log_belief, cost, self.searched, running)
+            found, there = _likeliest(self._log_belief, cost, self.searched, active)
         else:
-            found, there = _nearest(self.aim, cost, self.searched, running)
-        again = running & ~there
+            found, there = _nearest(self.source_estimate, cost, self.searched, active)
+        again = active & ~there
         if again.any():
             self.searched[again] = False
-            found = np.where(again[:, None], np.rint(self.aim).astype(np.int64), found)
+            found = np.where(again[:, None], np.rint(self.source_estimate).astype(np.int64), found)
         return np.clip(found, 0, cost.shape[1] - 1)
 
 
 @numba.njit(cache=True, fastmath=True)
-def _weigh(log_belief, place, aim, mirrored, running, error):  # type: ignore[no-untyped-def]
+def _weigh(log_belief, position, source_estimate, mirror_image, active, error):  # type: ignore[no-untyped-def]
     sigma, sigma_per_metre, front_back_prob, outlier_prob, weight = error
     metres = 0.5
     size = log_belief.shape[1]
     for n in range(len(log_belief)):
-        if not running[n]:
+        if not active[n]:
             continue
-        ax, ay, bx, by = aim[n, 0], aim[n, 1], mirrored[n, 0], mirrored[n, 1]
-        away = metres * np.sqrt((ax - place[n, 0]) ** 2 + (ay - place[n, 1]) ** 2)
+        ax, ay, bx, by = (
+            source_estimate[n, 0],
+            source_estimate[n, 1],
+            mirror_image[n, 0],
+            mirror_image[n, 1],
+        )
+        away = metres * np.sqrt((ax - position[n, 0]) ** 2 + (ay - position[n, 1]) ** 2)
         spread = (sigma + sigma_per_metre * away) / metres
         inverse = np.float32(0.5 / spread**2)
         for y in range(size):
@@ -155,13 +196,13 @@ def _weigh(log_belief, place, aim, mirrored, running, error):  # type: ignore[no
 
 
 @numba.njit(cache=True)
-def _likeliest(log_belief, cost, searched, running):  # type: ignore[no-untyped-def]
+def _likeliest(log_belief, cost, searched, active):  # type: ignore[no-untyped-def]
     size = cost.shape[1]
     found = np.zeros((len(cost), 2), dtype=np.int64)
     there = np.zeros(len(cost), dtype=np.bool_)
     for n in range(len(cost)):
         best = -np.inf
-        if running[n]:
+        if active[n]:
             for y in range(size):
                 for x in range(size):
                     value = log_belief[n, y, x]
@@ -172,25 +213,25 @@ def _likeliest(log_belief, cost, searched, running):  # type: ignore[no-untyped-
 
 
 @numba.njit(cache=True)
-def _nearest(aim, cost, searched, running):  # type: ignore[no-untyped-def]
+def _nearest(source_estimate, cost, searched, active):  # type: ignore[no-untyped-def]
     size = cost.shape[1]
     found = np.zeros((len(cost), 2), dtype=np.int64)
     there = np.zeros(len(cost), dtype=np.bool_)
     for n in range(len(cost)):
-        if not running[n]:
+        if not active[n]:
             continue
-        x0 = min(max(int(np.rint(aim[n, 0])), 0), size - 1)
-        y0 = min(max(int(np.rint(aim[n, 1])), 0), size - 1)
+        x0 = min(max(int(np.rint(source_estimate[n, 0])), 0), size - 1)
+        y0 = min(max(int(np.rint(source_estimate[n, 1])), 0), size - 1)
         least = np.inf
         for ring in range(size):
-            # squares of this ring and beyond are at least so far from the aim
+            # squares of this ring and beyond are at least so far from the estimate
             if there[n] and (ring - 0.5) ** 2 > least:
                 break
             for y in range(max(y0 - ring, 0), min(y0 + ring, size - 1) + 1):
                 step = 1 if abs(y - y0) == ring else max(2 * ring, 1)
                 for x in range(x0 - ring, x0 + ring + 1, step):
                     if 0 <= x < size and cost[n, y, x] < np.inf and not searched[n, y, x]:
-                        away = (x - aim[n, 0]) ** 2 + (y - aim[n, 1]) ** 2
+                        away = (x - source_estimate[n, 0]) ** 2 + (y - source_estimate[n, 1]) ** 2
                         if away < least:
                             least, there[n] = away, True
                             found[n, 0], found[n, 1] = x, y

@@ -114,8 +114,8 @@ def memory_figure(trace: Trace, name: str) -> Figure:
     figure = figure_of(11.5, 6.2)
     left, right = figure.subplots(1, 2, width_ratios=(1.35, 1))
     draw_place(left, trace)
-    if trace.walk is not None:
-        walk = trace.place.grid.centres[trace.walk // HEADINGS]
+    if trace.exploration_trajectory is not None:
+        walk = trace.scene.grid.centres[trace.exploration_trajectory // HEADINGS]
         left.plot(*walk.T, color="#9a9a9a", lw=1.0, zorder=6, label="exploration walk")
     draw_walk(left, trace, RUN_COLOURS[1], f"{name}: {outcome(trace)}")
     here, best = trace.path[:-1], beliefs.retrieved[:, 0]

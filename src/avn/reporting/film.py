@@ -169,12 +169,16 @@ class _Stage:
                     patch.set_visible(False)
             axes.plot(*trace.goal, "*", color="#ffb000", mec="black", markersize=17, zorder=12)
             axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
-        centres = trace.place.grid.centres
+        centres = trace.scene.grid.centres
         (x0, y0), (x1, y1) = centres.min(0) - 1.2, centres.max(0) + 1.2
         axes.set(xlim=(x0, x1), ylim=(y0, y1))
         self.recalled = None
-        if beliefs is not None and beliefs.retrieved is not None and trace.walk is not None:
-            walk = centres[trace.walk // HEADINGS]
+        if (
+            beliefs is not None
+            and beliefs.retrieved is not None
+            and trace.exploration_trajectory is not None
+        ):
+            walk = centres[trace.exploration_trajectory // HEADINGS]
             axes.plot(*walk.T, color="0.45", lw=0.9, zorder=7)
             (self.recalled,) = axes.plot([], [], "o", color="#7b3294", ms=8, alpha=0.8, zorder=8)
         (self.path,) = axes.plot([], [], color=_PATH, lw=2.6, zorder=9)

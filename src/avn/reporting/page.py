@@ -69,7 +69,7 @@ def render(
     title : str
     runs : sequence of PageRun
     plans : sequence of dict
-        Floor plans; see `page_media.plan_of_place`.
+        Floor plans; see `page_media.scene_plan`.
     views : sequence of str
         Data URLs of views; see `page_media.view_url`.
     episodes : sequence of dict

@@ -15,7 +15,7 @@ from PIL import Image
 
 from avn.apartments.floor_plan import CELL
 from avn.core.actions import HEADINGS
-from avn.navigation.place import Place
+from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.trace import Trace
 from avn.reporting.trajectory_figures import draw_apartment, outcome, title_of
 
@@ -40,17 +40,17 @@ def figure_url(figure: Figure) -> str:
     return data_url("image/png", small.getvalue())
 
 
-def plan_of_place(place: Place) -> dict[str, Any]:
+def scene_plan(scene: NavigationScene) -> dict[str, Any]:
     """Return the floor plan image of an apartment, its bounds and its cell centres in metres."""
-    low, high = place.grid.centres.min(axis=0) - _ROUND, place.grid.centres.max(axis=0) + _ROUND
+    low, high = scene.grid.centres.min(axis=0) - _ROUND, scene.grid.centres.max(axis=0) + _ROUND
     width, height = (high - low).tolist()
     figure = Figure(figsize=(width, height), dpi=_PIXELS_A_METRE)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
-    draw_apartment(axes, place)
+    draw_apartment(axes, scene)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    place_ = {"left": float(low[0]), "top": float(high[1]), "width": width, "height": height}
-    return {"image": figure_url(figure), "cells": _rounded(place.grid.centres), **place_}
+    bounds = {"left": float(low[0]), "top": float(high[1]), "width": width, "height": height}
+    return {"image": figure_url(figure), "cells": _rounded(scene.grid.centres), **bounds}
 
 
 def view_url(view: NDArray[np.uint8]) -> str:
@@ -116,9 +116,9 @@ def _belief(trace: Trace) -> dict[str, Any] | None:
 def _memory(trace: Trace) -> dict[str, Any] | None:
     """Return the exploration walk in an agent's memory and the retrieved positions."""
     beliefs = trace.beliefs
-    if beliefs is None or beliefs.retrieved is None or trace.walk is None:
+    if beliefs is None or beliefs.retrieved is None or trace.exploration_trajectory is None:
         return None
-    walk = trace.place.grid.centres[trace.walk // HEADINGS]
+    walk = trace.scene.grid.centres[trace.exploration_trajectory // HEADINGS]
     return {"walk": _rounded(walk), "entries": _rounded(beliefs.retrieved[..., :2])}
 
 

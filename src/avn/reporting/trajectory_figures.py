@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import CELL, FloorPlan
 from avn.core.actions import HEADINGS
-from avn.navigation.place import Place
+from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.trace import Trace
 from avn.reporting.floor_plan_figure import draw_floor_plan
 
@@ -25,26 +25,26 @@ FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 def plan_of(trace: Trace) -> FloorPlan | None:
     """Return the floor plan of a trace's apartment; None if it was drawn as text."""
-    return getattr(trace.place, "plan", None)
+    return getattr(trace.scene, "plan", None)
 
 
 def draw_place(axes: Axes, trace: Trace) -> None:
     """Draw a trace's apartment in faint colours, in metres, and the source."""
-    draw_apartment(axes, trace.place)
+    draw_apartment(axes, trace.scene)
     axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=15, zorder=12)
 
 
-def draw_apartment(axes: Axes, place: Place) -> None:
+def draw_apartment(axes: Axes, scene: NavigationScene) -> None:
     """Draw an apartment in faint colours, in metres: its floor plan, or its cells without one."""
-    plan: FloorPlan | None = getattr(place, "plan", None)
+    plan: FloorPlan | None = getattr(scene, "plan", None)
     if plan is None:
-        for x, y in place.grid.centres:
+        for x, y in scene.grid.centres:
             corner = (x - CELL / 2, y - CELL / 2)
             axes.add_patch(Rectangle(corner, CELL, CELL, color="#f2efe8", zorder=0))
         axes.set_aspect("equal")
         axes.autoscale_view()
     else:
-        draw_floor_plan(axes, plan, place.grid)
+        draw_floor_plan(axes, plan, scene.grid)
         for line in list(axes.lines):  # cells, edges and sources would hide the paths
             line.remove()
         for text in list(axes.texts):

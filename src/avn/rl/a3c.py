@@ -1,4 +1,4 @@
-"""A3C, and its loss: TorchRL's returns and A2C loss, with the trunk run once.
+"""A3C and its loss, with the advantages and the A2C loss of TorchRL.
 
 After Mnih et al., "Asynchronous methods for deep reinforcement learning" (ICML 2016).
 """
@@ -18,7 +18,7 @@ from torch import Tensor
 from torchrl.objectives import A2CLoss
 
 from avn.rl.algorithm import Algorithm, Loss
-from avn.rl.environment import FeatureModule
+from avn.rl.features import FeatureModule
 from avn.rl.networks import ActorCritic
 from avn.rl.rollouts import advantages_and_targets, trunk_outputs
 
@@ -30,11 +30,12 @@ class A3C(Algorithm):
     Attributes
     ----------
     gae_lambda : float
-        How far ahead advantages look (Schulman et al., ICLR 2016); 1 is all steps of the batch.
+        Lambda of generalized advantage estimation (Schulman et al., ICLR 2016), 0 to 1; 1 uses
+        all rewards of the rollout.
     entropy_coef : float
-        Weight of the policy's entropy.
+        Weight of the entropy of the policy, 0 or more.
     value_coef : float
-        Weight of the value's loss.
+        Weight of the value loss, 0 or more.
     """
 
     gae_lambda: float = 1.0
@@ -42,24 +43,27 @@ class A3C(Algorithm):
     value_coef: float = 0.5
 
     def __post_init__(self) -> None:
+        """Check the settings."""
         super().__post_init__()
         self.check(("gae_lambda",), lambda value: 0 <= value <= 1, "0 to 1")
         self.check(("entropy_coef", "value_coef"), lambda value: value >= 0, "0 or more")
 
     def build_loss(self, network: ActorCritic, features: FeatureModule) -> Loss:
-        """Build the loss of one worker."""
+        """Build the loss of one worker. See `Algorithm.build_loss`."""
         return ActorCriticLoss(network, features, self)
 
 
 class ActorCriticLoss:
-    """Policy gradient, value and entropy of a batch.
+    """Loss of a batch: policy gradient, value loss and entropy.
 
     Parameters
     ----------
     network : ActorCritic
+        Network whose parameters get the gradients.
     features : FeatureModule
-        Gives the observations for the numbers of the batch.
+        Looks up the features of the states and clips of the batch.
     recipe : A3C
+        Coefficients of the loss.
     """
 
     def __init__(self, network: ActorCritic, features: FeatureModule, recipe: A3C) -> None:
@@ -83,12 +87,18 @@ class ActorCriticLoss:
         )
 
     def __call__(self, batch: TensorDict) -> tuple[Tensor, dict[str, float]]:
-        """The loss, and figures of it by name.
+        """Compute the loss and its metrics.
 
         Parameters
         ----------
         batch : TensorDict (N, T)
             See `avn.rl.collectors.Batches`.
+
+        Returns
+        -------
+        loss : () tensor
+        metrics : dict of str to float
+            Policy loss, value loss and entropy.
         """
         network, recipe = self.network, self.recipe
         joint = trunk_outputs(network, self.features, batch)
@@ -106,7 +116,7 @@ class ActorCriticLoss:
         losses = self._loss(TensorDict(flat, batch_size=[batch.numel()]))
         names = {"loss_objective": "policy", "loss_critic": "value", "loss_entropy": "bonus"}
         total = sum(losses[key] for key in names if key in losses)
-        figures = {"loss/policy": losses["loss_objective"], "loss/value": losses["loss_critic"]}
+        metrics = {"loss/policy": losses["loss_objective"], "loss/value": losses["loss_critic"]}
         if "entropy" in losses:
-            figures["entropy"] = losses["entropy"]
-        return total, {name: float(figure.detach()) for name, figure in figures.items()}
+            metrics["entropy"] = losses["entropy"]
+        return total, {name: float(figure.detach()) for name, figure in metrics.items()}

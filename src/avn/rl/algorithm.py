@@ -11,75 +11,76 @@ from torch import Tensor
 
 from avn.core.errors import UserError
 from avn.navigation.reward import RewardConfig
-from avn.rl.environment import FeatureModule
+from avn.rl.features import FeatureModule
 from avn.rl.networks import ActorCritic
 
 UPDATE_ORDERS = ("free", "round_robin")
 COLLECTORS = ("tensor", "torchrl")
 SCHEDULES = ("constant", "linear")
-# Gives the loss of a batch, and metrics of it by name.
+# Maps a batch to its loss, and to metrics by name.
 Loss = Callable[[TensorDict], tuple[Tensor, dict[str, float]]]
 
 
 @dataclass
 class Algorithm(ABC):
-    """Reinforcement learning by workers that gather batches and apply gradients in turn.
+    """Reinforcement learning by parallel workers that share weights and RMSProp moments.
 
-    A subclass is a dataclass with the settings that it adds, and builds the loss. Workers gather
-    the batches, and apply the gradients of the loss with RMSProp.
+    A subclass is a dataclass that adds settings and builds the loss. Each worker collects batches
+    and applies the gradients of the loss to the shared weights.
 
     Attributes
     ----------
     workers : int
-        Processes.
+        Number of processes, 1 or more.
     num_envs : int
-        Episodes that each worker runs at once.
+        Episodes that each worker runs in parallel, 1 or more.
     rollout_length : int
-        Actions in each episode from which a gradient is computed.
+        Actions of each episode in a batch, 1 or more.
     total_steps : int
-        Actions in all, of all workers together.
+        Total number of actions of all workers, 1 or more.
     updates_per_batch : int
-        Gradients that are computed from one batch, one after another.
+        Gradient updates from each batch, 1 or more.
     update_order : {"free", "round_robin"}
-        Whether gradients are applied as they come, or worker by worker, so that the same seed gives
-        the same bytes; workers gather at the same time either way.
+        "free" applies gradients as they come; "round_robin" applies them worker by worker, so
+        that training is deterministic. Workers collect in parallel in both cases.
     collector : {"tensor", "torchrl"}
-        What gathers the batches; both give the same ones.
+        Collector of the batches: a loop over tensors or the one of TorchRL; both give the same
+        batches.
     lr : float
-        Learning rate of the RMSProp whose moments the workers share.
+        Learning rate of RMSProp, more than 0.
     alpha : float
-        Smoothing constant of its moments.
+        Smoothing constant of the RMSProp moments, 0 to 1.
     eps : float
-        Added to the root of the moments.
+        Constant that is added to the root of the moments, more than 0.
     schedule : {"constant", "linear"}
-        "linear" lowers the learning rate to 0.
+        Schedule of the learning rate; "linear" decays it to 0.
     max_grad_norm : float
-        The largest norm of a gradient; longer ones are scaled to it.
+        Largest norm of a gradient, to which longer ones are scaled; more than 0.
     gamma : float
-        Discount of rewards.
+        Discount factor of rewards, 0 to 1.
     max_steps : int
-        Actions after which a training episode is cut off; the value of what it saw last stands
-        for the rest of the return.
+        Actions after which a training episode is truncated, 1 or more. The return is then
+        bootstrapped with the value of the last observation.
     reward : RewardConfig
-        What each action earns.
+        Reward of each action.
     realisations : int
-        Realisations of each training clip.
+        Realisations of each training clip, 1 or more.
     exploration_walks : int
-        Exploration walks of each training apartment that episodes share.
+        Exploration trajectories of each training apartment, which episodes share, 1 or more.
     memory_refresh_interval : int
-        Batches of a worker after which it works through the exploration walks again with the
-        weights of that time.
+        Batches of a worker after which the LSTM states of the exploration trajectories are
+        computed again with the current weights, 1 or more.
     validate_every : int
-        Actions between two measurements of the agent.
+        Actions between two validations, 1 or more.
     validation_starts : int
-        Episodes of each source and sound of a measurement.
+        Validation episodes of each source and sound, 1 or more.
     train_seed : int
-        Draws weights, episodes and actions.
+        Seed of weights, episodes and actions.
 
     Raises
     ------
     UserError
-        For a value that cannot work.
+        If a setting is out of range.
     """
 
     workers: int = 2
@@ -105,6 +106,7 @@ class Algorithm(ABC):
     train_seed: int = 0
 
     def __post_init__(self) -> None:
+        """Check the settings."""
         counts: tuple[str, ...] = (
             "workers",
             "num_envs",
@@ -122,21 +124,21 @@ class Algorithm(ABC):
         self._check_names("schedule", SCHEDULES)
 
     def check(self, keys: tuple[str, ...], holds: Callable[[float], bool], wanted: str) -> None:
-        """Refuse settings out of range.
+        """Check that settings are in range.
 
         Parameters
         ----------
         keys : tuple of str
             Names of the settings.
         holds : callable
-            Whether a value can work.
+            Returns True for a valid value.
         wanted : str
-            The range, for the message.
+            Valid range, for the error message.
 
         Raises
         ------
         UserError
-            For the first setting that does not hold.
+            If a setting is not valid.
         """
         for key in keys:
             if not holds(getattr(self, key)):
@@ -149,7 +151,7 @@ class Algorithm(ABC):
 
     @property
     def batch(self) -> int:
-        """Actions in one batch of one worker."""
+        """Number of actions in one batch of one worker."""
         return self.num_envs * self.rollout_length
 
     @abstractmethod
@@ -159,14 +161,14 @@ class Algorithm(ABC):
         Parameters
         ----------
         network : ActorCritic
-            Its parameters get the gradients.
+            Network whose parameters get the gradients.
         features : FeatureModule
-            Gives the observations for the state and clip numbers of a batch.
+            Looks up the features of the states and clips of a batch.
 
         Returns
         -------
         callable
-            Takes a batch (N, T), see `avn.rl.collectors.Batches`, and gives the loss, and metrics
-            by name. It is called `updates_per_batch` times with each batch, and may keep in the
-            batch what its next call needs.
+            Maps a batch (N, T), see `avn.rl.collectors.Batches`, to its loss, and to metrics by
+            name. It is called `updates_per_batch` times with each batch, and may store values in
+            the batch for its next call.
         """

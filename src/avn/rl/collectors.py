@@ -1,4 +1,4 @@
-"""Two collectors that give the same batches: TorchRL's, and a leaner loop over plain tensors."""
+"""Collectors of training batches: the one of TorchRL, and a faster loop over tensors."""
 
 from __future__ import annotations
 
@@ -10,35 +10,45 @@ from tensordict import TensorDict
 from torch import Tensor
 from torchrl.collectors import Collector
 
-from avn.rl.environment import WalkEnv
+from avn.rl.environment import NavigationEnv
 from avn.rl.policy import FeatureLookup, Policy
 
 _NUMBERS = ("state", "clip")
 
 
 class Batches(Protocol):
-    """Gathers batches of N episodes and T steps.
+    """Protocol of collectors of batches of N episodes and T steps.
 
-    A batch is a TensorDict (N, T) as TorchRL lays it out: `index`, `is_init`, `action`, `map`,
-    `h` and `c` where there are any, and under `next` the same after the action, with `reward`,
-    `terminated`, `truncated` and `done`.
+    A batch is a TensorDict (N, T) in the layout of TorchRL: `index`, `is_init`, `action`, and
+    `map`, `h` and `c` if the policy uses them; `next` holds the same after the action, and
+    `reward`, `terminated`, `truncated` and `done`.
     """
 
     def collect(self) -> TensorDict:
-        """The next batch, which begins where the last one ended."""
+        """Collect the next batch, which continues the last one."""
 
     def restart(self) -> None:
-        """Look at the environment anew, after a state was loaded into it."""
+        """Observe the environment again, after its state was loaded."""
 
 
 class TorchrlCollector:
-    """`torchrl.collectors.Collector`, with numbers that travel and features that do not."""
+    """Collector of TorchRL; batches hold state and clip numbers in place of features.
 
-    def __init__(self, env: WalkEnv, policy: Policy, steps: int) -> None:
+    Parameters
+    ----------
+    env : NavigationEnv
+        Environment with N episodes.
+    policy : Policy
+        Chooses the actions.
+    rollout_length : int
+        T, steps of each batch.
+    """
+
+    def __init__(self, env: NavigationEnv, policy: Policy, rollout_length: int) -> None:
         self._collector = Collector(
             env,
             FeatureLookup(env.features, policy),
-            frames_per_batch=env.world.n * steps,
+            frames_per_batch=env.episodes.n * rollout_length,
             total_frames=-1,
             trust_policy=True,
             track_traj_ids=False,
@@ -47,31 +57,41 @@ class TorchrlCollector:
         self._batches = iter(self._collector)
 
     def collect(self) -> TensorDict:
-        """The next batch."""
+        """Collect the next batch."""
         return next(self._batches)
 
     def restart(self) -> None:
-        """Look at the environment anew."""
+        """Observe the environment again."""
         self._collector.reset()
 
 
 class TensorCollector:
-    """The same loop without a TensorDict for each step."""
+    """Collector that gives the same batches without a TensorDict for each step.
 
-    def __init__(self, env: WalkEnv, policy: Policy, steps: int) -> None:
-        self.env, self.policy, self.steps = env, policy, steps
+    Parameters
+    ----------
+    env : NavigationEnv
+        Environment with N episodes.
+    policy : Policy
+        Chooses the actions.
+    rollout_length : int
+        T, steps of each batch.
+    """
+
+    def __init__(self, env: NavigationEnv, policy: Policy, rollout_length: int) -> None:
+        self.env, self.policy, self.rollout_length = env, policy, rollout_length
         self.restart()
 
     def restart(self) -> None:
-        """Look at the environment anew."""
+        """Observe the environment again."""
         self.env.reset_all()
         self._seen = self.env.observation()
 
     def collect(self) -> TensorDict:
-        """The next batch."""
+        """Collect the next batch."""
         before: list[dict[str, Tensor]] = []
         after: list[dict[str, Tensor]] = []
-        for _ in range(self.steps):
+        for _ in range(self.rollout_length):
             features = self.env.features(*(self._seen[name] for name in _NUMBERS))
             said = self.policy.choose(self._seen | features)
             action, h, c = said["action"], said.get("h_next"), said.get("c_next")
@@ -91,7 +111,7 @@ class TensorCollector:
 
 
 def _laid_out(steps: list[dict[str, Tensor]]) -> TensorDict:
-    """Steps of (N, ...) tensors as a TensorDict (N, T)."""
+    """Stack steps of (N, ...) tensors to a TensorDict (N, T)."""
     found = {name: torch.stack([step[name] for step in steps], dim=1) for name in steps[0]}
     shape = found["state"].shape
     numbers = {name: found.pop(name) for name in _NUMBERS}
@@ -101,7 +121,7 @@ def _laid_out(steps: list[dict[str, Tensor]]) -> TensorDict:
 
 # TorchRL keeps a last axis of 1 for these.
 _FLAGS = ("is_init", "reward", "terminated", "truncated", "done")
-COLLECTORS: dict[str, Callable[[WalkEnv, Policy, int], Batches]] = {
+COLLECTORS: dict[str, Callable[[NavigationEnv, Policy, int], Batches]] = {
     "torchrl": TorchrlCollector,
     "tensor": TensorCollector,
 }

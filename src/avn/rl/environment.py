@@ -1,4 +1,4 @@
-"""The environment for TorchRL: N episodes in one batch, which begin anew by themselves."""
+"""Environment for TorchRL: N episodes in one batch."""
 
 from __future__ import annotations
 
@@ -7,84 +7,53 @@ from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
-from torch import Tensor, nn
+from torch import Tensor
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from avn.core.errors import UserError
 from avn.mapping.ego_map import EgoMap
 from avn.navigation.batched_episodes import BatchedEpisodes
-from avn.navigation.scene_batch import SceneBatch
 from avn.rl.exploration_memory import ExplorationMemory
+from avn.rl.features import FeatureModule
 
-# What an agent may observe beside what is heard and seen.
+# Observations that are no features of clips or views.
 OWN = ("collided", "odometry", "map")
 
 
-class FeatureModule(nn.Module):
-    """Resolves the numbers of states and clips into what is seen and heard there.
-
-    It belongs to the environment, and lies where the policy does: numbers travel, features do not,
-    and a policy sees features alone.
+class NavigationEnv(EnvBase):
+    """Audio-visual navigation in N parallel episodes.
 
     Parameters
     ----------
-    tables : Tables
+    episodes : BatchedEpisodes
+        States, rewards and ends of the episodes.
     observes : sequence of str
-        Names in `tables.visual` and `tables.audio`.
-    """
-
-    def __init__(self, tables: SceneBatch, observes: Sequence[str]) -> None:
-        super().__init__()
-        self.seen = [name for name in observes if name in tables.visual]
-        self.heard = [name for name in observes if name in tables.audio]
-        for name in (*self.seen, *self.heard):
-            table = tables.visual.get(name, tables.audio.get(name))
-            self.register_buffer(name, table, persistent=False)
-
-    def range(self, name: str) -> tuple[float, float]:
-        """The least and the greatest number of an observation."""
-        low, high = torch.aminmax(torch.nan_to_num(getattr(self, name).float()))
-        return float(low), float(high)
-
-    def forward(self, state: Tensor, clip: Tensor) -> dict[str, Tensor]:
-        """What is observed in states (...,) and in clips (...,), by name, (..., D) each."""
-        found = {name: getattr(self, name)[state] for name in self.seen}
-        return found | {name: getattr(self, name)[clip] for name in self.heard}
-
-
-class WalkEnv(EnvBase):
-    """Audio-visual navigation in N episodes at once.
-
-    Parameters
-    ----------
-    world : World
-    observes : sequence of str
-        What an agent observes: names of visual observations (`visual_embedding`, `local_patch`,
-        ...) and of audio ones (`source_estimate`, `audio_embedding`, ...) that the world's tables
-        have, and `collided`, `odometry`, `map`.
-    explorations : Explorations, optional
-        The walks that episodes begin with; their memories are what `h` and `c` begin with.
+        Names of the observations: visual ones (`visual_embedding`, `local_patch`, ...) and audio
+        ones (`source_estimate`, `audio_embedding`, ...) of `episodes.tables`, and `collided`,
+        `odometry` and `map`.
+    explorations : ExplorationMemory, optional
+        Exploration trajectories, whose LSTM states are the first `h` and `c` of episodes.
     memory : int
-        Units of the policy's LSTM. Its memory travels with the episode: a policy reads `h` and
-        `c` and writes `h_next` and `c_next`.
+        Units of the policy's LSTM; 0 for none. The policy reads `h` and `c`, and writes `h_next`
+        and `c_next`.
     map_size, map_width : int
-        Of the occupancy map, for `map`.
+        Squares along each side of the occupancy map, and of its observed part, for `map`.
     resolved : bool
-        Whether observations hold features; otherwise they hold `state` and `clip` under `index`,
-        which `features` resolves.
+        True if observations hold features; False if they hold the numbers `state` and `clip` under
+        `index`, for `features`.
 
     Raises
     ------
     UserError
-        Where the tables have no such observation.
+        If an observation does not exist.
     """
 
     batch_locked = True
 
     def __init__(
         self,
-        world: BatchedEpisodes,
+        episodes: BatchedEpisodes,
         observes: Sequence[str],
         explorations: ExplorationMemory | None = None,
         memory: int = 0,
@@ -92,27 +61,27 @@ class WalkEnv(EnvBase):
         map_width: int = 21,
         resolved: bool = True,
     ) -> None:
-        super().__init__(device="cpu", batch_size=[world.n])
-        tables = world.tables
+        super().__init__(device="cpu", batch_size=[episodes.n])
+        tables = episodes.tables
         known = (*tables.visual, *tables.audio, *OWN)
         for name in observes:
             if name not in known:
                 raise UserError(f"observes: '{name}' is none of {', '.join(known)}")
-        self.world, self.observes = world, tuple(observes)
+        self.episodes, self.observes = episodes, tuple(observes)
         self.features = FeatureModule(tables, observes)
         self.explorations, self.resolved = explorations, resolved
         self.memory_units, self.map_width = memory, map_width
-        self._map = EgoMap(world.n, map_size, map_width) if "map" in observes else None
+        self._map = EgoMap(episodes.n, map_size, map_width) if "map" in observes else None
         self._kept = False
-        self._everyone = torch.ones(world.n, dtype=torch.bool)
+        self._everyone = torch.ones(episodes.n, dtype=torch.bool)
         self.begin(self._everyone)
         self._make_specs()
 
-    # --- plain tensors, which both collectors use ---
+    # --- interface of tensors, for both collectors ---
 
     def begin(self, rows: Tensor) -> None:
         """Begin new episodes in some rows, (N,) bool."""
-        self.world.begin(rows)
+        self.episodes.begin(rows)
         self.is_init = rows.clone()
         if self.memory_units:
             h, c = self._first_memory()
@@ -128,8 +97,21 @@ class WalkEnv(EnvBase):
     def move(
         self, actions: Tensor, h: Tensor | None = None, c: Tensor | None = None
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Move every agent; see `World.step`. `h` and `c` are what it remembers from now on."""
-        outcome = self.world.step(actions)
+        """Move every agent by one action.
+
+        Parameters
+        ----------
+        actions : (N,) int64
+            See `avn.core.actions`.
+        h, c : (N, 1, units) float32, optional
+            LSTM state after the observation that led to the actions.
+
+        Returns
+        -------
+        reward, terminated, truncated : (N,) tensors
+            See `BatchedEpisodes.step`.
+        """
+        outcome = self.episodes.step(actions)
         self.is_init = torch.zeros_like(self._everyone)
         if h is not None and c is not None:
             self.h, self.c = h, c
@@ -138,12 +120,16 @@ class WalkEnv(EnvBase):
         return outcome
 
     def observation(self) -> dict[str, Tensor]:
-        """All that there is to know now: numbers of state and clip, own state, memory."""
-        found = {"state": self.world.state, "clip": self.world.clip(), "is_init": self.is_init}
+        """Return state and clip numbers, `is_init`, own observations and LSTM state by name."""
+        found = {
+            "state": self.episodes.state,
+            "clip": self.episodes.clip(),
+            "is_init": self.is_init,
+        }
         if "collided" in self.observes:
-            found["collided"] = self.world.collided
+            found["collided"] = self.episodes.collided
         if "odometry" in self.observes:
-            found["odometry"] = self.world.odometry()
+            found["odometry"] = self.episodes.odometry()
         if self._map is not None:
             found["map"] = self._around
         if self.memory_units:
@@ -151,8 +137,11 @@ class WalkEnv(EnvBase):
         return found
 
     def state_dict(self, *args: Any, **kwargs: Any) -> dict[str, Any]:
-        """All that goes on changing."""
-        kept: dict[str, Any] = {"world": self.world.state_dict(), "is_init": self.is_init.clone()}
+        """Return copies of all tensors that change."""
+        kept: dict[str, Any] = {
+            "episodes": self.episodes.state_dict(),
+            "is_init": self.is_init.clone(),
+        }
         if self.memory_units:
             kept |= {"h": self.h.clone(), "c": self.c.clone()}
         if self._map is not None:
@@ -160,8 +149,8 @@ class WalkEnv(EnvBase):
         return kept
 
     def load_state_dict(self, kept: Mapping[str, Any], *args: Any, **kwargs: Any) -> None:
-        """Go on where `state_dict` was taken: the next `reset` of all begins nothing anew."""
-        self.world.load_state_dict(kept["world"])
+        """Restore what `state_dict` returned; the next `reset_all` then begins no episode."""
+        self.episodes.load_state_dict(kept["episodes"])
         self.is_init = kept["is_init"].clone()
         if self.memory_units:
             self.h, self.c = kept["h"].clone(), kept["c"].clone()
@@ -171,7 +160,7 @@ class WalkEnv(EnvBase):
         self._kept = True
 
     def reset_all(self) -> None:
-        """Begin new episodes in all rows, unless a state was just loaded."""
+        """Begin new episodes in all rows, unless `load_state_dict` was just called."""
         if not self._kept:
             self.begin(self._everyone)
         self._kept = False
@@ -179,28 +168,32 @@ class WalkEnv(EnvBase):
     def _first_memory(self) -> tuple[Tensor, Tensor]:
         explored = self.explorations
         if explored is not None and explored.h.shape[-1]:
-            return explored.h[self.world.walk], explored.c[self.world.walk]
-        zeros = torch.zeros(self.world.n, 1, self.memory_units)
+            return explored.h[self.episodes.trajectory_index], explored.c[
+                self.episodes.trajectory_index
+            ]
+        zeros = torch.zeros(self.episodes.n, 1, self.memory_units)
         return zeros, zeros
 
     def _look_around(self, actions: Tensor | None) -> Tensor:
-        """The map around each agent, and that of its walk, (N, channels, width, width)."""
+        """Return the maps around each agent, own and explored, (N, channels, width, width)."""
         assert self._map is not None
-        world = self.world
+        episodes = self.episodes
         observation = TensorDict(
             {
-                "odometry": world.odometry(),
-                "collided": world.collided,
-                "local_patch": world.tables.visual["local_patch"][world.state],
+                "odometry": episodes.odometry(),
+                "collided": episodes.collided,
+                "local_patch": episodes.tables.visual["local_patch"][episodes.state],
             },
-            batch_size=[world.n],
+            batch_size=[episodes.n],
         )
         own = self._map.observe(observation, actions)
         if self.explorations is None or not self.explorations.maps:
             return own[:, None]
-        return torch.stack((own, self.explorations.map_of_walk(world.walk, world.state)), dim=1)
+        return torch.stack(
+            (own, self.explorations.explored_map(episodes.trajectory_index, episodes.state)), dim=1
+        )
 
-    # --- what TorchRL asks for ---
+    # --- interface of TorchRL ---
 
     def _observation(self) -> TensorDict:
         found = self.observation()
@@ -231,11 +224,11 @@ class WalkEnv(EnvBase):
         return following
 
     def _set_seed(self, seed: int | None) -> None:
-        self.world.generator.manual_seed(0 if seed is None else seed)
+        self.episodes.generator.manual_seed(0 if seed is None else seed)
 
     def _make_specs(self) -> None:
-        n, world = self.world.n, self.world
-        self.action_spec = Categorical(world.protocol.actions, shape=(n,), dtype=torch.int64)
+        n, episodes = self.episodes.n, self.episodes
+        self.action_spec = Categorical(episodes.protocol.actions, shape=(n,), dtype=torch.int64)
         self.reward_spec = Unbounded(shape=(n, 1))
         flags = {
             name: Categorical(2, shape=(n, 1), dtype=torch.bool)
@@ -249,7 +242,10 @@ class WalkEnv(EnvBase):
 
     def _spec(self, name: str, value: Any) -> Any:
         if name == "index":
-            most = {"state": self.world.tables.states, "clip": max(1, self.world.tables.clips)}
+            most = {
+                "state": self.episodes.tables.states,
+                "clip": max(1, self.episodes.tables.clips),
+            }
             return Composite(
                 {key: _whole(0, most[key] - 1, value[key].shape) for key in most},
                 shape=self.batch_size,
@@ -258,7 +254,7 @@ class WalkEnv(EnvBase):
             return Categorical(2, shape=value.shape, dtype=torch.bool)
         if name == "map":
             return Bounded(0.0, 1.0, shape=value.shape)
-        if name in (*self.features.seen, *self.features.heard):
+        if name in (*self.features.visual, *self.features.audio):
             return Bounded(*self.features.range(name), shape=value.shape, dtype=value.dtype)
         return Unbounded(shape=value.shape, dtype=value.dtype)
 

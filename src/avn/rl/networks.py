@@ -1,4 +1,4 @@
-"""Actor-critic networks: one trunk, an LSTM where the agent remembers, two heads."""
+"""Actor-critic networks: a shared trunk, an optional LSTM and two heads."""
 
 from __future__ import annotations
 
@@ -11,28 +11,29 @@ from torchrl.modules import LSTMModule
 
 from avn.core.errors import UserError
 
-# Length of a standardised feature: with it as long as it has parts, one step of the optimiser would
-# turn the trunk over.
+# Typical norm of a standardised feature. With unit variance in each of its dimensions, the norm
+# would be so large that single optimiser steps destabilise the trunk.
 _LENGTH = 8.0
-# Beliefs are 0.5 where nothing is known, which shall be no input at all.
+# Probability of unknown squares, which is subtracted so that they contribute nothing.
 _UNKNOWN = 0.5
 
 
 @dataclass(frozen=True)
 class NetworkSpec:
-    """What an actor-critic is built for.
+    """Sizes of the inputs and layers of an actor-critic.
 
     Attributes
     ----------
     features : dict of str to int
         Sizes of the features by name, such as `visual_embedding` and `audio_embedding`.
     actions : int
+        Number of actions.
     width : int
         Units of each layer of the trunk.
     memory : int
         Units of the LSTM; 0 for none.
     map_channels, map_width : int
-        Of the map that it is shown; 0 channels for none.
+        Channels and squares along each side of the map; 0 channels for no map.
     """
 
     features: dict[str, int]
@@ -44,51 +45,59 @@ class NetworkSpec:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of all that it is shown."""
+        """Names of all inputs."""
         return (*self.features, *(("map",) if self.map_channels else ()))
 
 
 class ActorCritic(nn.Module):
-    """Chooses actions and judges places from features, maps and memory.
+    """Policy and value function of features, maps and an LSTM state.
 
-    The features are standardised, concatenated and go through two layers; the map goes through one
-    of its own and joins them. The heads see the trunk's output, and that of the LSTM beside it.
+    The features are standardised, concatenated and go through two layers; a linear layer of the
+    map is added to the first. The heads take the output of the trunk, concatenated with the output
+    of the LSTM if there is one.
+
+    Parameters
+    ----------
+    spec : NetworkSpec
+        Sizes of inputs and layers.
+
+    Raises
+    ------
+    UserError
+        If the network has no input.
     """
 
-    def __init__(self, shape: NetworkSpec) -> None:
+    def __init__(self, spec: NetworkSpec) -> None:
         super().__init__()
-        if not shape.inputs:
+        if not spec.inputs:
             raise UserError("baseline: an actor-critic needs something to see or hear")
-        self.shape = shape
-        # a layer for each feature, added up, is one layer for all of them behind each other
+        self.spec = spec
+        # the sum of a layer for each feature is one layer of their concatenation
         self.encoders = nn.ModuleDict(
-            {
-                name: nn.Linear(size, shape.width, bias=False)
-                for name, size in shape.features.items()
-            }
+            {name: nn.Linear(size, spec.width, bias=False) for name, size in spec.features.items()}
         )
-        for name, size in shape.features.items():
+        for name, size in spec.features.items():
             self.register_buffer(f"{name}_mean", torch.zeros(size))
             self.register_buffer(f"{name}_scale", torch.ones(size))
-        squares = shape.map_channels * shape.map_width**2
-        self.map_encoder = nn.Linear(squares, shape.width, bias=False) if squares else None
-        self.bias = nn.Parameter(torch.zeros(shape.width))
-        self.second = nn.Linear(shape.width, shape.width)
+        squares = spec.map_channels * spec.map_width**2
+        self.map_encoder = nn.Linear(squares, spec.width, bias=False) if squares else None
+        self.bias = nn.Parameter(torch.zeros(spec.width))
+        self.second = nn.Linear(spec.width, spec.width)
         self.lstm: LSTMModule | None = None
-        if shape.memory:
+        if spec.memory:
             self.lstm = LSTMModule(
-                input_size=shape.width,
-                hidden_size=shape.memory,
+                input_size=spec.width,
+                hidden_size=spec.memory,
                 in_keys=["embedding", "h", "c"],
                 out_keys=["remembered", "h_next", "c_next"],
             )
-        self.actor = nn.Linear(shape.width + shape.memory, shape.actions)
-        self.critic = nn.Linear(shape.width + shape.memory, 1)
+        self.actor = nn.Linear(spec.width + spec.memory, spec.actions)
+        self.critic = nn.Linear(spec.width + spec.memory, 1)
         self._draw_weights()
 
     def _draw_weights(self) -> None:
-        for name, size in self.shape.features.items():
-            gain = (2 * max(size, self.shape.width)) ** 0.5 / _LENGTH
+        for name, size in self.spec.features.items():
+            gain = (2 * max(size, self.spec.width)) ** 0.5 / _LENGTH
             nn.init.orthogonal_(self.encoders[name].get_parameter("weight"), gain)
         nn.init.orthogonal_(self.second.weight, 2**0.5)
         if self.map_encoder is not None:
@@ -99,20 +108,20 @@ class ActorCritic(nn.Module):
             nn.init.zeros_(layer.bias)
 
     def standardise(self, name: str, examples: Tensor) -> None:
-        """Take mean and spread of a feature from examples, (n, D)."""
+        """Set the mean and scale of a feature from examples, (n, D)."""
         mean, spread = examples.float().mean(dim=0), examples.float().std(dim=0)
         getattr(self, f"{name}_mean").copy_(mean)
         scale = _LENGTH / (spread.clamp_min(1e-6) * len(mean) ** 0.5)
         getattr(self, f"{name}_scale").copy_(torch.where(spread > 1e-6, scale, 0.0))
 
     def embed(self, inputs: Mapping[str, Tensor]) -> Tensor:
-        """What the trunk makes of N observations.
+        """Compute the output of the trunk for N observations.
 
         Parameters
         ----------
         inputs : mapping of str to (N, D) tensor
-            Features by name, and `map` (N, channels, width, width). A feature that is missing,
-            such as sound while exploring, tells nothing.
+            Features by name, and `map` (N, channels, width, width). Missing features, such as
+            audio during exploration, contribute nothing.
 
         Returns
         -------
@@ -129,23 +138,26 @@ class ActorCritic(nn.Module):
         return torch.relu(self.second(torch.relu(total)))
 
     def no_memory(self, n: int) -> tuple[Tensor, Tensor]:
-        """The memory of N agents that remember nothing, (N, 1, units) each."""
-        zeros = self.bias.new_zeros(n, 1, self.shape.memory)
+        """Return the initial LSTM state of N agents, zeros, h and c (N, 1, units)."""
+        zeros = self.bias.new_zeros(n, 1, self.spec.memory)
         return zeros, zeros
 
     def remember(self, embedding: Tensor, h: Tensor, c: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """One step of the memory.
+        """Run one step of the LSTM.
 
         Parameters
         ----------
         embedding : (N, width) tensor
+            Output of the trunk.
         h, c : (N, 1, units) tensors
+            LSTM state before the step.
 
         Returns
         -------
         joint : (N, width + units) tensor
-            What the heads see.
+            Input of the heads.
         h, c : (N, 1, units) tensors
+            LSTM state after the step.
         """
         if self.lstm is None:
             return embedding, h, c
@@ -161,20 +173,22 @@ class ActorCritic(nn.Module):
         return torch.cat((embedding, h), dim=1), h[:, None], c[:, None]
 
     def unroll(self, embedding: Tensor, h: Tensor, c: Tensor, first: Tensor) -> Tensor:
-        """T steps of the memory with gradients through them.
+        """Run T steps of the LSTM with gradients through time.
 
         Parameters
         ----------
         embedding : (N, T, width) tensor
+            Outputs of the trunk.
         h, c : (N, T, 1, units) tensors
-            The memory before each step, of which that before the first step and those before the
-            first step of an episode are used.
+            LSTM states before each step; those of the first step and of the first steps of
+            episodes are used.
         first : (N, T) bool tensor
-            Where an episode begins.
+            True at the first step of an episode.
 
         Returns
         -------
         (N, T, width + units) tensor
+            Inputs of the heads.
         """
         if self.lstm is None:
             return embedding
@@ -193,18 +207,22 @@ class ActorCritic(nn.Module):
 
 
 def sample(logits: Tensor, generator: torch.Generator | None = None) -> Tensor:
-    """Actions drawn with the softmax of (N, A) logits, (N,) int64."""
+    """Sample actions, (N,) int64, from the softmax of logits (N, A)."""
     return first_of(logits, torch.empty_like(logits).exponential_(generator=generator))
 
 
 def first_of(logits: Tensor, race: Tensor) -> Tensor:
-    """The action that wins a race, (N,) int64.
+    """Sample actions from given exponential draws.
 
-    Of independent arrivals at rates p the first is i with a chance of p_i.
+    Of independent exponential times with rates p, the smallest is number i with probability p_i.
 
     Parameters
     ----------
     logits, race : (N, A) tensors
-        Of the softmax that is drawn from, and times of arrival at a rate of 1.
+        Logits of the softmax, and exponential draws with rate 1.
+
+    Returns
+    -------
+    (N,) int64 tensor
     """
     return (torch.softmax(logits, dim=-1) / race).argmax(dim=-1)

@@ -1,4 +1,4 @@
-"""What losses need of a batch: the trunk of the network run over it, advantages and targets."""
+"""Inputs of losses: outputs of the trunk over a batch, advantages and value targets."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from tensordict import TensorDict
 from torch import Tensor
 from torchrl.objectives.value.functional import vec_generalized_advantage_estimate
 
-from avn.rl.environment import FeatureModule
+from avn.rl.features import FeatureModule
 from avn.rl.networks import ActorCritic
 
 
 def trunk_outputs(network: ActorCritic, features: FeatureModule, batch: TensorDict) -> Tensor:
-    """What the heads of a network see at each step of a batch, with gradients.
+    """Compute the inputs of the heads at each step of a batch, with gradients.
 
     Parameters
     ----------
     network : ActorCritic
+        Network to evaluate.
     features : FeatureModule
-        Gives the observations for the numbers of the batch.
+        Looks up the features of the states and clips of the batch.
     batch : TensorDict (N, T)
         See `avn.rl.collectors.Batches`.
 
@@ -28,7 +29,7 @@ def trunk_outputs(network: ActorCritic, features: FeatureModule, batch: TensorDi
         Inputs of `network.actor` and `network.critic`.
     """
     inputs = _inputs(batch, features)
-    flat = {name: inputs[name].flatten(0, 1) for name in network.shape.inputs}
+    flat = {name: inputs[name].flatten(0, 1) for name in network.spec.inputs}
     embedding = network.embed(flat).unflatten(0, batch.batch_size)
     if network.lstm is None:
         return embedding
@@ -43,23 +44,24 @@ def advantages_and_targets(
     gamma: float,
     gae_lambda: float,
 ) -> tuple[Tensor, Tensor]:
-    """Advantages of the actions of a batch, and targets of the values.
+    """Compute advantages and value targets by generalized advantage estimation.
 
-    The value after a step is that of the next step, but for the last one, and where the
-    episode was cut off: there it is that of what was seen then.
+    Schulman et al., "High-dimensional continuous control using generalized advantage estimation",
+    ICLR 2016. At the last step and at truncated steps, the next value is that of the observation
+    after the step.
 
     Parameters
     ----------
     network : ActorCritic
+        Network to evaluate.
     features : FeatureModule
-        Gives the observations for the numbers of the batch.
+        Looks up the features of the states and clips of the batch.
     batch : TensorDict (N, T)
         See `avn.rl.collectors.Batches`.
     value : (N, T, 1) tensor
         Values of the states of the batch.
     gamma, gae_lambda : float
-        Discount, and how far ahead advantages look (Schulman et al., "High-dimensional continuous
-        control using generalized advantage estimation", ICLR 2016).
+        Discount factor and lambda, 0 to 1.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Parameters and RMSProp moments that all workers share, each laid out as one vector."""
+"""Parameters and RMSProp moments in shared memory, one vector each."""
 
 from __future__ import annotations
 
@@ -10,13 +10,19 @@ from torch import Tensor, nn
 
 
 def flatten_parameters(network: nn.Module) -> tuple[Tensor, Tensor]:
-    """Lay all parameters of a network out in one vector, and their gradients in another.
+    """Concatenate the parameters of a network in one vector, and their gradients in another.
 
-    The parameters become views of the first vector, so that one copy changes them all.
+    The parameters and their gradients become views of the vectors.
+
+    Parameters
+    ----------
+    network : nn.Module
+        Changed in place.
 
     Returns
     -------
     weights, gradients : (P,) tensors
+        Parameters, and gradients set to 0.
     """
     parameters = list(network.parameters())
     weights = torch.cat([p.detach().flatten() for p in parameters])
@@ -31,14 +37,14 @@ def flatten_parameters(network: nn.Module) -> tuple[Tensor, Tensor]:
 
 @dataclass
 class SharedState:
-    """What workers read and write in turn.
+    """Weights and optimiser state that workers share.
 
     Attributes
     ----------
     weights, moments : (P,) float32 tensors in shared memory
         Parameters, and running means of squared gradients.
     updates : (1,) int64 tensor in shared memory
-        Gradients that were applied.
+        Number of applied gradients.
     """
 
     weights: Tensor
@@ -47,20 +53,25 @@ class SharedState:
 
     @classmethod
     def of(cls, weights: Tensor) -> SharedState:
-        """A state with these weights, no moments and no updates."""
+        """Create a state with copies of weights, moments of 0 and no updates."""
         tensors = (weights.clone(), torch.zeros_like(weights), torch.zeros(1, dtype=torch.int64))
         return cls(*(tensor.share_memory_() for tensor in tensors))
 
     def apply(
         self, gradients: Tensor, rate: Callable[[int], float], alpha: float, eps: float
     ) -> None:
-        """One step of RMSProp (not centred, no momentum), as `torch.optim.RMSprop` makes it.
+        """Apply one step of RMSProp, not centred and without momentum, as `torch.optim.RMSprop`.
 
         Parameters
         ----------
         gradients : (P,) tensor
+            Gradients of the loss.
         rate : callable
-            Learning rate after so many updates.
+            Maps the number of applied gradients to the learning rate.
+        alpha : float
+            Smoothing constant of the moments, 0 to 1.
+        eps : float
+            Constant that is added to the root of the moments.
         """
         self.moments.mul_(alpha).addcmul_(gradients, gradients, value=1 - alpha)
         lr = rate(int(self.updates))

@@ -1,4 +1,4 @@
-"""Training of an actor-critic: chunks of updates, with measurement and checkpoint between them."""
+"""Training of an actor-critic in rounds, with validation and a checkpoint after each."""
 
 from __future__ import annotations
 
@@ -21,30 +21,36 @@ from avn.rl.worker import TrainingSpec
 from avn.rl.worker_pool import start_pool
 
 LAST, BEST, CURVE = "last.ckpt", "best.ckpt", "curve.json"
-# By which figure the best network is chosen.
+# Validation metric that selects the best network.
 MONITOR = "validation/spl"
 Measure = Callable[[ActorCritic], dict[str, float]]
 
 
 class Training:
-    """A training that goes on where it was.
+    """Training that resumes from its last checkpoint.
 
     Parameters
     ----------
-    spec : Task
+    spec : TrainingSpec
+        Apartments, protocol, network and algorithm.
     network : ActorCritic
-        Its weights are the first ones; afterwards they are those of the last round.
+        Gives the initial weights, and holds those of the last round afterwards.
     folder : Path
-        Where checkpoints and TensorBoard's events lie.
+        Folder of checkpoints and TensorBoard events.
     measure : callable
-        Figures of a network by name, `MONITOR` among them.
-    made_from : str
-        Hash of all that the training depends on, for the checkpoints.
+        Returns the validation metrics of a network by name, including `MONITOR`.
+    fingerprint : str
+        Hash of all settings and data of the training, stored in checkpoints.
+
+    Attributes
+    ----------
+    curve : list of dict
+        Metrics of each round by name; the first entry is the untrained network.
 
     Raises
     ------
     UserError
-        Where the last checkpoint belongs to another training, or is damaged.
+        If the last checkpoint is damaged or belongs to another training.
     """
 
     def __init__(
@@ -53,10 +59,10 @@ class Training:
         network: ActorCritic,
         folder: Path,
         measure: Measure,
-        made_from: str,
+        fingerprint: str,
     ) -> None:
         self.spec, self.network, self.folder = spec, network, folder
-        self.measure, self.made_from = measure, made_from
+        self.measure, self.fingerprint = measure, fingerprint
         self._weights, _ = flatten_parameters(network)
         self.shared = SharedState.of(self._weights)
         self.curve: list[dict[str, float]] = []
@@ -66,12 +72,22 @@ class Training:
             self._resume()
 
     def run(self, rounds: int | None = None) -> list[dict[str, float]]:
-        """Train to the end, or so many rounds; gives the figures of each round.
+        """Train to the end, or for a number of rounds.
+
+        Parameters
+        ----------
+        rounds : int, optional
+            Largest number of further rounds.
+
+        Returns
+        -------
+        list of dict
+            Metrics of each round by name; the first entry is the untrained network.
 
         Raises
         ------
         UserError
-            Where a worker dies.
+            If a worker dies.
         """
         recipe = self.spec.recipe
         updates = max(1, recipe.total_steps // (recipe.batch * recipe.workers))
@@ -82,14 +98,14 @@ class Training:
             last = min(last, len(self._rounds()) + rounds)
         with SummaryWriter(str(self.folder), purge_step=self.steps + 1) as writer:
             if not self.curve:
-                self._close_round({}, writer)
+                self._end_round({}, writer)
             if len(self._rounds()) < last:
                 self._go(last, each, updates, writer)
         return self.curve
 
     @property
     def steps(self) -> int:
-        """Actions that were learnt from."""
+        """Number of actions that were learnt from."""
         return self._batches * self.spec.recipe.batch
 
     @property
@@ -97,7 +113,7 @@ class Training:
         return int(self.shared.updates) // self.spec.recipe.updates_per_batch
 
     def _rounds(self) -> list[dict[str, float]]:
-        """The rounds that were made; the curve begins with the untrained network."""
+        """Return the entries of the curve after that of the untrained network."""
         return self.curve[1:]
 
     def _go(self, last: int, each: int, updates: int, writer: SummaryWriter) -> None:
@@ -120,20 +136,20 @@ class Training:
                     reports = pool.run_chunk(todo, progress)
                     seconds = time.perf_counter() - started
                     self._states = [state for _, state in reports]
-                    figures = _mean([found for found, _ in reports])
-                    figures["steps_per_second"] = (self.steps - before) / seconds
-                    self._close_round(figures, writer)
+                    metrics = _mean([found for found, _ in reports])
+                    metrics["steps_per_second"] = (self.steps - before) / seconds
+                    self._end_round(metrics, writer)
         finally:
             pool.close()
 
-    def _close_round(self, figures: dict[str, float], writer: SummaryWriter) -> None:
-        """Measure, keep the best, log, and write the checkpoint."""
+    def _end_round(self, metrics: dict[str, float], writer: SummaryWriter) -> None:
+        """Validate, save the best network, log, and write the checkpoint."""
         self._weights.copy_(self.shared.weights)
-        found = {"steps": float(self.steps), **figures, **self.measure(self.network)}
+        found = {"steps": float(self.steps), **metrics, **self.measure(self.network)}
         best = max((own[MONITOR] for own in self.curve), default=float("-inf"))
         self.curve.append(found)
         if found[MONITOR] > best:
-            self._write(BEST, save_network(self.network, self.made_from))
+            self._write(BEST, save_network(self.network, self.fingerprint))
         for name, value in found.items():
             if name != "steps":
                 group = name if "/" in name else f"train/{name}"
@@ -143,7 +159,7 @@ class Training:
         self._write(
             LAST,
             {
-                "made_from": self.made_from,
+                "fingerprint": self.fingerprint,
                 **shared,
                 "updates": int(self.shared.updates),
                 "workers": self._states,
@@ -159,7 +175,7 @@ class Training:
 
     def _resume(self) -> None:
         path = self.folder / LAST
-        kept = read_checkpoint(path, self.made_from)
+        kept = read_checkpoint(path, self.fingerprint)
         try:
             self.shared.weights.copy_(kept["weights"])
             self.shared.moments.copy_(kept["moments"])
@@ -171,44 +187,59 @@ class Training:
         log(f"{path}: going on after {self.steps} steps")
 
 
-def save_network(network: ActorCritic, made_from: str) -> dict[str, Any]:
-    """The content of a checkpoint that holds a network alone."""
+def save_network(network: ActorCritic, fingerprint: str) -> dict[str, Any]:
+    """Return the content of a checkpoint of a network alone."""
     weights = {name: value.clone() for name, value in network.state_dict().items()}
-    shape = dataclasses.asdict(network.shape)
-    return {"made_from": made_from, "shape": shape, "network": weights}
+    network_spec = dataclasses.asdict(network.spec)
+    return {"fingerprint": fingerprint, "network_spec": network_spec, "network": weights}
 
 
-def load_network(network: ActorCritic, path: Path, made_from: str) -> None:
-    """Give a network the weights of a checkpoint.
+def load_network(network: ActorCritic, path: Path, fingerprint: str) -> None:
+    """Load the weights of a checkpoint into a network.
+
+    Parameters
+    ----------
+    network : ActorCritic
+        Changed in place.
+    path : Path
+        Checkpoint of `save_network`.
+    fingerprint : str
+        Expected fingerprint of the checkpoint.
 
     Raises
     ------
     UserError
-        Where it is missing, damaged, or of another row or recipe.
+        If the checkpoint is missing, damaged or of another training.
     """
-    kept = read_checkpoint(path, made_from)
+    kept = read_checkpoint(path, fingerprint)
     try:
-        if kept["shape"] != dataclasses.asdict(network.shape):
+        if kept["network_spec"] != dataclasses.asdict(network.spec):
             raise UserError(
-                f"{path}: features or sizes are {kept['shape']}, and the config's are "
-                f"{dataclasses.asdict(network.shape)}; delete {path.parent} to train again"
+                f"{path}: features or sizes are {kept['network_spec']}, and the config's are "
+                f"{dataclasses.asdict(network.spec)}; delete {path.parent} to train again"
             )
         network.load_state_dict(kept["network"])
     except (KeyError, RuntimeError, TypeError) as error:
         raise _damaged(path) from error
 
 
-def read_checkpoint(path: Path, made_from: str) -> dict[str, Any]:
-    """A checkpoint's content; raises `UserError` where it is damaged or of another training."""
+def read_checkpoint(path: Path, fingerprint: str) -> dict[str, Any]:
+    """Read the content of a checkpoint.
+
+    Raises
+    ------
+    UserError
+        If it is missing, damaged or of another training.
+    """
     try:
         kept: dict[str, Any] = torch.load(path, weights_only=True)
-        found = kept["made_from"]
+        found = kept["fingerprint"]
     except Exception as error:
         raise _damaged(path) from error
-    if found != made_from:
+    if found != fingerprint:
         raise UserError(
             f"{path}: the checkpoint is of another row or recipe ({str(found)[:8]}, not "
-            f"{made_from[:8]}); delete {path.parent} to train again"
+            f"{fingerprint[:8]}); delete {path.parent} to train again"
         )
     return kept
 
@@ -217,10 +248,10 @@ def _damaged(path: Path) -> UserError:
     return UserError(f"{path}: damaged; delete {path.parent} to train again")
 
 
-def _mean(figures: list[dict[str, float]]) -> dict[str, float]:
-    names = dict.fromkeys(name for own in figures for name in own)
+def _mean(metrics: list[dict[str, float]]) -> dict[str, float]:
+    names = dict.fromkeys(name for own in metrics for name in own)
     found = {}
     for name in names:
-        values = [own[name] for own in figures if name in own]
+        values = [own[name] for own in metrics if name in own]
         found[name] = sum(values) / len(values)
     return found

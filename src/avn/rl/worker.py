@@ -1,4 +1,4 @@
-"""One worker of A3C: a copy of the network, an environment, and gradients for the shared state."""
+"""Worker of a training: a copy of the network, an environment, and updates of shared weights."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from avn.navigation.scene_batch import SceneBatch
 from avn.navigation.start_sampler import build_start_sampler
 from avn.rl.algorithm import Algorithm
 from avn.rl.collectors import COLLECTORS
-from avn.rl.environment import WalkEnv
+from avn.rl.environment import NavigationEnv
 from avn.rl.exploration_memory import ExplorationMemory
 from avn.rl.networks import ActorCritic, NetworkSpec
 from avn.rl.policy import Policy
@@ -29,64 +29,70 @@ Lock = Callable[[], AbstractContextManager[Any]]
 
 @dataclass(frozen=True)
 class TrainingSpec:
-    """What there is to learn: apartments, rules, and the network that learns.
+    """Apartments, protocol, network and algorithm of a training.
 
     Attributes
     ----------
-    tables : Tables
+    tables : SceneBatch
+        Training apartments.
     protocol : Protocol
-    shape : Shape
+        Actions, goal and limits of the episodes.
+    network_spec : NetworkSpec
+        Sizes of the network.
     recipe : Algorithm
+        Settings of the algorithm.
     buffers : dict of str to tensor
-        Of the network: how its features are standardised.
+        Buffers of the network: mean and scale of its features.
     map_size : int
-        Squares along each side of the occupancy map.
-    walks : (R, W, T) int64 tensor or None
-        Exploration walks, for agents that remember.
+        Squares along each side of the occupancy map, odd.
+    trajectories : (R, W, T) int64 tensor or None
+        Exploration trajectories, for agents with memory.
     top : int
-        Entries of the spatial memory that tell where an agent is on the map of its walk.
+        Entries of the spatial memory that an estimate of the pose averages.
     """
 
     tables: SceneBatch
     protocol: Protocol
-    shape: NetworkSpec
+    network_spec: NetworkSpec
     recipe: Algorithm
     buffers: dict[str, Tensor]
     map_size: int = 101
-    walks: Tensor | None = None
+    trajectories: Tensor | None = None
     top: int = 3
 
 
 class Worker:
-    """Gathers batches and applies gradients in its turn.
+    """Worker that collects batches and applies gradients to the shared weights.
 
     Parameters
     ----------
     rank : int
-        Number of the worker; it draws other episodes and actions than the others.
-    spec : Task
+        Number of the worker, part of the seed of its episodes and actions.
+    spec : TrainingSpec
+        Apartments, protocol, network and algorithm.
     shared : SharedState
+        Weights and optimiser state of all workers.
     lock : callable
-        Gives the context in which it may change the shared state.
+        Returns the context in which the worker may change the shared state.
     """
 
     def __init__(self, rank: int, spec: TrainingSpec, shared: SharedState, lock: Lock) -> None:
-        recipe, shape = spec.recipe, spec.shape
+        recipe, network_spec = spec.recipe, spec.network_spec
         self.rank, self.recipe, self.shared, self.lock = rank, recipe, shared, lock
-        self.network = ActorCritic(shape)
+        self.network = ActorCritic(network_spec)
         self.network.load_state_dict(spec.buffers, strict=False)
         self.weights, self.gradients = flatten_parameters(self.network)
         self.updates = 0
         self.explorations = None
-        if spec.walks is not None:
-            map_size = spec.map_size if shape.map_channels else 0
+        if spec.trajectories is not None:
+            map_size = spec.map_size if network_spec.map_channels else 0
             self.explorations = ExplorationMemory(
-                spec.tables, spec.walks, map_size, shape.map_width, spec.top
+                spec.tables, spec.trajectories, map_size, network_spec.map_width, spec.top
             )
         visited = None if self.explorations is None else self.explorations.visited()
         seed = derive("a3c", recipe.train_seed, rank) >> 1
         self.policy = Policy(self.network, torch.Generator().manual_seed(seed ^ 1))
-        world = BatchedEpisodes(
+        episodes = BatchedEpisodes(
             spec.tables,
             build_start_sampler(spec.tables, visited),
             recipe.num_envs,
@@ -98,13 +104,13 @@ class Worker:
         self._copy_weights()
         if self.explorations is not None:
             self.explorations.remember(self.network)
-        self.env = WalkEnv(
-            world,
-            shape.inputs,
+        self.env = NavigationEnv(
+            episodes,
+            network_spec.inputs,
             self.explorations,
-            shape.memory,
+            network_spec.memory,
             spec.map_size,
-            shape.map_width,
+            network_spec.map_width,
             resolved=False,
         )
         self.loss = recipe.build_loss(self.network, self.env.features)
@@ -112,66 +118,82 @@ class Worker:
         total = max(1, recipe.total_steps // recipe.batch) * recipe.updates_per_batch
         falling = recipe.schedule == "linear"
         self.rate = lambda done: recipe.lr * (max(0.0, 1 - done / total) if falling else 1.0)
-        self.scores, self._refresh = EpisodeStats(recipe.num_envs), recipe.memory_refresh_interval
+        self.episode_stats, self._refresh = (
+            EpisodeStats(recipe.num_envs),
+            recipe.memory_refresh_interval,
+        )
 
     def update(self) -> dict[str, float]:
-        """Gather one batch and apply its gradients; gives the metrics of the last by name."""
+        """Collect one batch, apply its gradients, and return the metrics of the last by name."""
         self._explore()
         batch = self.collector.collect()
-        self.scores.take(batch)
+        self.episode_stats.update(batch)
         for _ in range(self.recipe.updates_per_batch):
-            figures = self._learn(batch)
+            metrics = self._learn(batch)
         self.updates += 1
-        return figures
+        return metrics
 
     def _learn(self, batch: TensorDict) -> dict[str, float]:
         self.gradients.zero_()
-        loss, figures = self.loss(batch)
+        loss, metrics = self.loss(batch)
         loss.backward()
-        figures["gradient_norm"] = self._clip()
+        metrics["gradient_norm"] = self._clip()
         with self.lock():
             recipe = self.recipe
             self.shared.apply(self.gradients, self.rate, recipe.alpha, recipe.eps)
             self._copy_weights()
-        return figures
+        return metrics
 
     def run_chunk(
         self, updates: int, progress: Callable[[], None] = lambda: None
     ) -> dict[str, float]:
-        """So many updates; gives the means of their figures, and of the episodes that ended."""
-        figures = []
+        """Make a number of updates.
+
+        Parameters
+        ----------
+        updates : int
+            Number of batches.
+        progress : callable
+            Called after each update.
+
+        Returns
+        -------
+        dict of str to float
+            Means of the metrics of all updates, and those of the episodes that ended.
+        """
+        metrics = []
         for _ in range(updates):
-            figures.append(self.update())
+            metrics.append(self.update())
             progress()
-        means = {name: sum(f[name] for f in figures) / len(figures) for name in figures[0]}
-        return means | self.scores.figures()
+        means = {name: sum(f[name] for f in metrics) / len(metrics) for name in metrics[0]}
+        return means | self.episode_stats.metrics()
 
     def state_dict(self) -> dict[str, Any]:
-        """All that goes on changing, but for the shared state."""
+        """Return the state of the worker, without the shared state."""
         kept: dict[str, Any] = {
             "env": self.env.state_dict(),
             "actions": self.policy.generator.get_state(),
             "weights": self.weights.clone(),
             "updates": self.updates,
-            "scores": self.scores.state_dict(),
+            "episode_stats": self.episode_stats.state_dict(),
         }
         if self.explorations is not None:
             kept["memories"] = (self.explorations.h.clone(), self.explorations.c.clone())
         return kept
 
     def load_state_dict(self, kept: dict[str, Any]) -> None:
-        """Go on where `state_dict` was taken."""
+        """Restore what `state_dict` returned."""
         self.weights.copy_(kept["weights"])
         self.updates = kept["updates"]
         if self.explorations is not None:
             self.explorations.h, self.explorations.c = kept["memories"]
         self.env.load_state_dict(kept["env"])
         self.policy.generator.set_state(kept["actions"])
-        self.scores.load_state_dict(kept["scores"])
+        self.episode_stats.load_state_dict(kept["episode_stats"])
         self.collector.restart()
 
     def _explore(self) -> None:
-        """Work through the exploration walks again, where it is time to."""
+        """Compute the LSTM states of the exploration again, at each refresh interval."""
         if self.explorations is not None and self.updates and not self.updates % self._refresh:
             self.explorations.remember(self.network)
 
@@ -179,7 +201,7 @@ class Worker:
         self.weights.copy_(self.shared.weights)
 
     def _clip(self) -> float:
-        """Shorten the gradient to the recipe's length; gives its length before."""
+        """Clip the gradient to the largest norm, and return its norm before."""
         norm = float(self.gradients.norm())
         if norm > self.recipe.max_grad_norm:
             self.gradients.mul_(self.recipe.max_grad_norm / norm)
@@ -187,15 +209,21 @@ class Worker:
 
 
 class EpisodeStats:
-    """Return and success of the training episodes that ended since the last figures."""
+    """Return and success of the training episodes that ended since the last `metrics`.
+
+    Parameters
+    ----------
+    n : int
+        Number of parallel episodes.
+    """
 
     def __init__(self, n: int) -> None:
         self._running = torch.zeros(n)
         self.returns: list[float] = []
         self._successes: list[float] = []
 
-    def take(self, batch: Any) -> None:
-        """Take in a batch (N, T)."""
+    def update(self, batch: Any) -> None:
+        """Add the rewards and ends of a batch (N, T)."""
         rewards, done = batch["next", "reward"][..., 0], batch["next", "done"][..., 0]
         for step in range(rewards.shape[1]):
             self._running = self._running + rewards[:, step]
@@ -204,8 +232,8 @@ class EpisodeStats:
             self._successes += (rewards[:, step][ended] > 0).float().tolist()
             self._running = self._running.masked_fill(ended, 0.0)
 
-    def figures(self) -> dict[str, float]:
-        """Means by name, of what has ended; nothing where nothing has."""
+    def metrics(self) -> dict[str, float]:
+        """Return means over the ended episodes by name, if there are any, and reset them."""
         if not self.returns:
             return {}
         count = len(self.returns)
@@ -217,10 +245,10 @@ class EpisodeStats:
         return found
 
     def state_dict(self) -> Any:
-        """All that goes on changing."""
+        """Return the returns and successes so far."""
         return self._running.clone(), list(self.returns), list(self._successes)
 
     def load_state_dict(self, kept: Any) -> None:
-        """Go on where `state_dict` was taken."""
+        """Restore what `state_dict` returned."""
         running, returns, successes = kept
         self._running, self.returns, self._successes = running.clone(), [*returns], [*successes]

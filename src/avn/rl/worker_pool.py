@@ -1,4 +1,4 @@
-"""The workers of A3C: one in this process, or several in processes of their own."""
+"""Pools of workers: one in this process, or several in processes of their own."""
 
 from __future__ import annotations
 
@@ -18,22 +18,45 @@ from avn.rl.shared import SharedState
 from avn.rl.worker import TrainingSpec, Worker
 
 Report = tuple[dict[str, float], dict[str, Any]]
-# Seconds after which the progress is looked at again.
+# Seconds between two updates of the progress.
 _LOOK = 0.2
 
 
 class WorkerPool(Protocol):
-    """All workers of a training."""
+    """Protocol of pools of workers."""
 
     def run_chunk(self, updates: int, progress: Callable[[], None]) -> list[Report]:
-        """Let every worker make so many updates; gives figures and states, worker by worker."""
+        """Let every worker make a number of updates.
+
+        Parameters
+        ----------
+        updates : int
+            Updates of each worker.
+        progress : callable
+            Called from time to time.
+
+        Returns
+        -------
+        list of (dict, dict)
+            Metrics and state of each worker.
+        """
 
     def close(self) -> None:
         """End the workers."""
 
 
 class LocalPool:
-    """One worker, in this process and with one thread."""
+    """Pool of one worker, in this process and with one thread.
+
+    Parameters
+    ----------
+    spec : TrainingSpec
+        Apartments, protocol, network and algorithm.
+    shared : SharedState
+        Weights and optimiser state.
+    states : list of dict
+        State of the worker, or an empty list to begin.
+    """
 
     def __init__(
         self, spec: TrainingSpec, shared: SharedState, states: list[dict[str, Any]]
@@ -45,21 +68,30 @@ class LocalPool:
             self._worker.load_state_dict(states[0])
 
     def run_chunk(self, updates: int, progress: Callable[[], None]) -> list[Report]:
-        """Let the worker make so many updates."""
+        """Let the worker make a number of updates. See `WorkerPool.run_chunk`."""
         return [(self._worker.run_chunk(updates, progress), self._worker.state_dict())]
 
     def close(self) -> None:
-        """Give the threads back."""
+        """Restore the number of threads."""
         torch.set_num_threads(self._threads)
 
 
 class SpawnedPool:
-    """Workers in processes of their own, with one thread each.
+    """Pool of workers in processes of their own, with one thread each.
+
+    Parameters
+    ----------
+    spec : TrainingSpec
+        Apartments, protocol, network and algorithm.
+    shared : SharedState
+        Weights and optimiser state of all workers.
+    states : list of dict
+        State of each worker, or an empty list to begin.
 
     Raises
     ------
     UserError
-        Here and in `run_chunk`, where a worker dies; the others are ended.
+        Here and in `run_chunk`, if a worker dies; the others are ended.
     """
 
     def __init__(
@@ -67,7 +99,7 @@ class SpawnedPool:
     ) -> None:
         context, count = mp.get_context("spawn"), spec.recipe.workers
         spec.tables.share()
-        # kept, for a semaphore that nobody holds is gone before its process opens it
+        # kept, since an unreferenced semaphore is gone before its process opens it
         self._locks = locks = _locks(context, spec.recipe.update_order, count)
         self._links: list[Connection] = []
         self._processes = []
@@ -82,13 +114,13 @@ class SpawnedPool:
             theirs.close()
             self._links.append(ours)
             self._processes.append(process)
-        for rank in range(count):  # all begin with the same weights, whoever is up first
+        for rank in range(count):  # wait, so that all workers begin with the same weights
             self._report(rank)
 
     def run_chunk(self, updates: int, progress: Callable[[], None]) -> list[Report]:
-        """Let every worker make so many updates."""
+        """Let every worker make a number of updates. See `WorkerPool.run_chunk`."""
         for link in self._links:
-            with suppress(OSError):  # of a dead worker, which its report tells
+            with suppress(OSError):  # of a dead worker, which `_report` raises
                 link.send(updates)
         reports: dict[int, Report] = {}
         while len(reports) < len(self._links):
@@ -126,7 +158,7 @@ class SpawnedPool:
 
 
 def _locks(context: Any, order: str, count: int) -> list[Any]:
-    """What a worker takes for its turn, by rank; it gives back that of the next rank."""
+    """Return the semaphore that each rank acquires; it releases that of the next rank."""
     if order == "free":
         return [context.Semaphore(1)] * count
     return [context.Semaphore(int(rank == 0)) for rank in range(count)]
@@ -147,7 +179,7 @@ def _work(
     link: Connection,
     state: dict[str, Any] | None,
 ) -> None:
-    """What a process does: rounds, until it is ended."""
+    """Run rounds in a process until it is ended."""
     torch.set_num_threads(1)
 
     def lock() -> AbstractContextManager[None]:
@@ -159,8 +191,8 @@ def _work(
             worker.load_state_dict(state)
         link.send(("done", None))
         while True:
-            figures = worker.run_chunk(link.recv())
-            link.send(("done", (figures, worker.state_dict())))
+            metrics = worker.run_chunk(link.recv())
+            link.send(("done", (metrics, worker.state_dict())))
     except (EOFError, KeyboardInterrupt):
         return
     except UserError as error:
@@ -169,12 +201,26 @@ def _work(
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{os.path.basename(last.filename)}:{last.lineno}"
         answer = ("died", f"{type(error).__name__}: {error} ({where})")
-    with suppress(OSError):  # where nobody listens any more
+    with suppress(OSError):  # if the parent has ended
         link.send(answer)
 
 
 def start_pool(spec: TrainingSpec, shared: SharedState, states: list[dict[str, Any]]) -> WorkerPool:
-    """Start the workers of a recipe, from their states where there are any."""
+    """Start the workers of a training.
+
+    Parameters
+    ----------
+    spec : TrainingSpec
+        Apartments, protocol, network and algorithm.
+    shared : SharedState
+        Weights and optimiser state of all workers.
+    states : list of dict
+        State of each worker, or an empty list to begin.
+
+    Returns
+    -------
+    WorkerPool
+    """
     cores, workers = os.cpu_count() or 1, spec.recipe.workers
     if workers > cores:
         log(

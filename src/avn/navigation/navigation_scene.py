@@ -1,4 +1,4 @@
-"""What the simulator needs of an apartment, and a way to draw one as text."""
+"""Protocol of the scenes that the simulator runs in, and scenes drawn as text."""
 
 from __future__ import annotations
 
@@ -12,29 +12,41 @@ from avn.apartments.grid import STEPS, Grid, moves_between
 from avn.core.errors import UserError
 
 
-class Place(Protocol):
-    """An apartment as agents walk it; `avn.dataset.scene.Scene` is one."""
+class NavigationScene(Protocol):
+    """Apartment in which agents move; `avn.dataset.scene.Scene` implements it."""
 
     @property
     def name(self) -> str:
-        """The apartment's name."""
+        """Name of the apartment."""
 
     @property
     def grid(self) -> Grid:
-        """Cells, moves, distances and rooms."""
+        """Cells with their neighbours, distances and rooms."""
 
     @property
     def sources(self) -> NDArray[np.int32]:
-        """Cells of the K sources, (K,)."""
+        """Cells of the K sources, (K,) int32."""
 
     @property
     def in_sight(self) -> NDArray[np.bool_]:
-        """Whether each source is in sight from each cell, (K, C)."""
+        """True if the source is in sight from the cell, (K, C) bool."""
 
 
 @dataclass(frozen=True)
-class DrawnPlace:
-    """An apartment that was drawn as text."""
+class DrawnScene:
+    """Scene that was drawn as text; see `draw`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the scene.
+    grid : Grid
+        Cells with their neighbours, distances and rooms.
+    sources : (K,) int32
+        Cells of the sources.
+    in_sight : (K, C) bool
+        True if the source is in sight from the cell.
+    """
 
     name: str
     grid: Grid
@@ -42,17 +54,28 @@ class DrawnPlace:
     in_sight: NDArray[np.bool_]
 
 
-def draw(name: str, drawing: str) -> DrawnPlace:
-    """An apartment from text, for trying an agent out on a few cells.
+def draw(name: str, drawing: str) -> DrawnScene:
+    """Make a scene from text, for tests of agents on a few cells.
 
-    Every character is a square of 0.5 m, the first line lies in the north. `a`, `b`, ... are free
-    cells of the first, second, ... room, capitals are free cells where a source stands, and
-    everything else is blocked.
+    Every character is a square of 0.5 m, and the first line lies in the north. `a`, `b`, ... are
+    free cells of the first, second, ... room, capitals are free cells with a source, and all other
+    characters are blocked squares.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+    drawing : str
+        Lines of characters.
+
+    Returns
+    -------
+    DrawnScene
 
     Raises
     ------
     UserError
-        Where there is no free cell or no source, or free cells do not hang together.
+        If there is no source, or the free cells are not connected.
     """
     rows = [line.strip() for line in drawing.strip().splitlines()][::-1]
     free = [(x, y) for y, row in enumerate(rows) for x, mark in enumerate(row) if mark.isalpha()]
@@ -71,7 +94,7 @@ def draw(name: str, drawing: str) -> DrawnPlace:
         rooms=np.array([ord(mark.lower()) - ord("a") for mark in marks], dtype=np.int16),
         squares=len(free),
     )
-    return DrawnPlace(name, grid, sources, _in_sight(grid, sources))
+    return DrawnScene(name, grid, sources, _in_sight(grid, sources))
 
 
 def _distances(name: str, neighbours: NDArray[np.int32]) -> NDArray[np.int16]:
@@ -82,7 +105,7 @@ def _distances(name: str, neighbours: NDArray[np.int32]) -> NDArray[np.int16]:
 
 
 def _in_sight(grid: Grid, sources: NDArray[np.int32], samples: int = 65) -> NDArray[np.bool_]:
-    """Whether the straight line from source to cell stays on free squares, (K, C)."""
+    """Return True if the line from source to cell stays on free squares, (K, C) bool."""
     low = grid.lattice.min(axis=0) - 1
     free = np.zeros(grid.lattice.max(axis=0) - low + 2, dtype=bool)
     free[tuple((grid.lattice - low).T)] = True

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from avn.core.errors import UserError
-from avn.navigation.place import DrawnPlace, draw
+from avn.navigation.navigation_scene import DrawnScene, draw
 
 
-def test_drawing_gives_cells_moves_rooms_and_sources(two_rooms: DrawnPlace) -> None:
+def test_drawing_gives_cells_moves_rooms_and_sources(two_rooms: DrawnScene) -> None:
     grid = two_rooms.grid
     assert grid.cells == 51
     assert np.bincount(grid.rooms).tolist() == [26, 25]
@@ -17,7 +17,7 @@ def test_drawing_gives_cells_moves_rooms_and_sources(two_rooms: DrawnPlace) -> N
     assert grid.lattice[west].tolist() == [4, 2]
 
 
-def test_walls_hide_the_source(two_rooms: DrawnPlace) -> None:
+def test_walls_hide_the_source(two_rooms: DrawnScene) -> None:
     at = {tuple(xy): cell for cell, xy in enumerate(two_rooms.grid.lattice.tolist())}
     # The source at (9, 2) is seen through the doorway along its row, and not past the wall.
     assert two_rooms.in_sight[0, at[0, 2]]
