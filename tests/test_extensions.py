@@ -23,6 +23,7 @@ import torch
 from torch import nn
 
 from avn.acoustics.microphone import Microphone
+from avn.agents.actor_critic import ActorCriticAgent
 from avn.agents.base import Agent
 from avn.agents.planner_agent import PlannerAgent
 from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT
@@ -83,6 +84,16 @@ class LazyPlanner(PlannerAgent):
         actions = super().act(observation)
         self.left -= 1
         return torch.full_like(actions, ROTATE_LEFT) if self.left >= 0 else actions
+
+
+class DepthCritic(ActorCriticAgent):
+    """An actor-critic that sees depth, with a temperature of its actions."""
+
+    needs = ("visual_embedding", "depth")
+
+    def __init__(self, temperature: float = 1.0, **settings):
+        super().__init__(**settings)
+        self.temperature = temperature
 
 
 class Square(Agent):
@@ -175,6 +186,8 @@ OPTIONS = {
     "occupancy_model/patient": {"_target_": "own_parts.PatientSight", "name": "patient"},
     "mapper/forgetful": {"_target_": "own_parts.ForgetfulMapper", "name": "forgetful"},
     "planner/lazy": {"_target_": "own_parts.LazyPlanner", "name": "lazy"},
+    "baseline/depth": {"_target_": "own_parts.DepthCritic"},
+    "protocol/wide": {"defaults": ["stop", "_self_"], "radius": 2.0},
     "baseline/square": {"_target_": "own_parts.Square"},
     "protocol/near": {
         "_target_": "own_parts.NearProtocol",
@@ -280,6 +293,22 @@ def test_an_algorithm(run):
     assert "entropy" not in curve[-1]  # of A3C alone
     walked = episodes(run("eval", "agent=a3c_va", "algorithm=reinforce"))
     assert (walked["actions"] > 0).all()
+
+
+@pytest.mark.parametrize("memory", [0, 8])
+def test_an_actor_critic_that_observes_depth(run, memory):
+    chosen = ("baseline=depth", f"agent.name=depth_{memory}", f"baseline.memory={memory}")
+    folder = run("train", "model=a3c_va", *chosen, "baseline.temperature=0.5")
+    sizes = json.loads((folder / "metrics.json").read_text())["features"]
+    assert set(sizes) == {"visual_embedding", "depth", "audio_embedding"}
+    assert sizes["depth"] == 32 * 32
+    assert (episodes(run("eval", "agent=a3c_va", *chosen))["actions"] > 0).all()
+
+
+def test_an_option_without_a_name_is_named_after_its_file(run):
+    found = episodes(run("eval", "agent=random_walk", "protocol=wide"))
+    assert set(found["protocol"]) == {"wide"}
+    assert found["geodesic"].min() > 2.0
 
 
 def test_a_protocol(run):

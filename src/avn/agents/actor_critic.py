@@ -94,7 +94,9 @@ class ActorCriticAgent(Agent):
         ego = EgoMap(count, self.map_size, self.map_width) if self.maps else None
 
         def inputs(step: int) -> dict[str, Tensor]:
-            own = {"visual_embedding": trajectories["visual_embedding"][:, step]}
+            features = self._trained().spec.features
+            known = set(trajectories.keys())
+            own = {name: trajectories[name][:, step] for name in features if name in known}
             if ego is not None:
                 own["map"] = with_unknown_exploration(ego.observe(trajectories[:, step]))
             return own

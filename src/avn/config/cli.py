@@ -61,7 +61,10 @@ def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]],
 
 def _help(config_name: str) -> None:
     _, folders = without_folders(sys.argv[1:])
-    print(help_text(config_name, folders, TRAINING))
+    try:
+        print(help_text(config_name, folders, TRAINING), flush=True)
+    except BrokenPipeError:  # of `--help | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
@@ -227,7 +230,9 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
         if isinstance(link, OSError) and link.filename and not isinstance(link, HydraException):
             return _one_line(f"{link.filename}: {link.strerror}")
     if not composed or isinstance(error, USER_MISTAKES):
-        first, *causes = dict.fromkeys(_one_line(str(link)) for link in chain if str(link))
+        lines = (_one_line(str(link)) for link in chain if str(link))
+        # OmegaConf leaves the name of a key out of some of its messages
+        first, *causes = dict.fromkeys(line for line in lines if "$FULL_KEY" not in line)
         known = [_known(link) for link in chain if _known(link)][:1]
         return "; ".join([first, *(cause for cause in causes[:1] if cause not in first), *known])
     return None

@@ -5,6 +5,7 @@ It reads the package's config files and those of the user's folders (`--config-d
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,10 @@ from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import DictConfig, ListConfig, OmegaConf, open_dict
 
+from avn.apartments.splits import SplitConfig
 from avn.config.folder import conf_folder, without_folders
 from avn.config.renamed import check_file
-from avn.config.schema import SCHEMAS
+from avn.config.schema import BASES, SCHEMAS
 from avn.config.signatures import is_option, with_signature
 from avn.core.errors import UserError
 
@@ -105,6 +107,12 @@ class OptionFilesPath(SearchPathPlugin):
             search_path.prepend("command-line", f"avn://{folder}")
 
 
+def _is_named(group: str) -> bool:
+    """Return True if options of a group have a name, which is that of the file by default."""
+    base = SplitConfig if group == "split" else BASES.get(group)
+    return base is not None and any(field.name == "name" for field in dataclasses.fields(base))
+
+
 def _on_top(group: str, node: DictConfig, defaults: ListConfig) -> tuple[DictConfig, ListConfig]:
     """Merge an option with a class of its own onto the options of its group that it names.
 
@@ -142,7 +150,9 @@ def _typed(name: str, node: DictConfig) -> DictConfig:
         raise UserError(
             f"{name}: its defaults name a schema, which options need no more; remove it"
         )
-    group = name.split("/")[0]
+    group, _, option = name.partition("/")
+    if option and _is_named(group) and "name" not in node:
+        node["name"] = option
     if is_option(group, node) and defaults is not None:
         node, defaults = _on_top(group, node, defaults)
     if is_option(group, node):

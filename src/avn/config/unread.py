@@ -58,9 +58,17 @@ def refuse_unread(command: str, cfg: DictConfig, read: Collection[str]) -> None:
 
 def _unread(key: str, cfg: DictConfig, read: Collection[str]) -> UserError:
     return UserError(
-        f"{key}: not read by this run, so that it would change nothing; the run reads "
+        f"{key}: not read by this run, {_reason(key, cfg)}; the run reads "
         f"{', '.join(summary(cfg, read))}"
     )
+
+
+def _reason(key: str, cfg: DictConfig) -> str:
+    group = key.split(".")[0]
+    node = cfg.get(group)
+    if isinstance(node, DictConfig) and "_target_" in node and node["_target_"] is None:
+        return f"which has no {group} ({group}=none)"
+    return "which does not use it with its other settings"
 
 
 def _key(override: Override) -> str:

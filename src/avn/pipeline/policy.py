@@ -17,6 +17,7 @@ from avn.agents.rollout import Labels, rollout_scene
 from avn.core.classes import build_object, import_class
 from avn.core.errors import UserError
 from avn.core.files import check_name
+from avn.core.progress import log
 from avn.core.settings import plain
 from avn.dataset.scene import Scene
 from avn.mapping.ego_map import EgoMap
@@ -28,9 +29,11 @@ from avn.pipeline.apartments import TRAINING
 from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.policy_data import (
     SUBSETS,
+    actor_critic,
+    feature_sizes,
     load_subset,
+    observation_names,
     observed,
-    parts,
     subset_stages,
     tables_of,
 )
@@ -77,7 +80,8 @@ class Policy(Trained):
         """Refuse an agent that does not learn, and recipes that cannot work."""
         if not learns(self.cfg):
             raise UserError(
-                f"agent: '{self.cfg.agent.name}' is no actor-critic; choose model=a3c_va"
+                f"baseline: that of agent '{self.cfg.agent.name}' is no actor-critic; choose "
+                "model=a3c_va"
             )
         check_name("agent.name", self.cfg.agent.name)
         build_algorithm(self.cfg)
@@ -154,7 +158,9 @@ class Policy(Trained):
             raise UserError(
                 f"{self.folder / METRICS}: damaged; delete {self.folder} to train again"
             )
-        return {str(name): int(size) for name, size in sizes.items()}
+        # the sum over features is one of floating-point numbers: their order is that of training
+        order = [name for name in observation_names(self.cfg) if name in sizes]
+        return {name: int(sizes[name]) for name in order}
 
 
 def _network_spec(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
@@ -175,7 +181,7 @@ def _train(policy: Policy) -> None:
     cfg, recipe = policy.cfg, build_algorithm(policy.cfg)
     opened = {subset: load_subset(cfg, subset) for subset in SUBSETS}
     tables = tables_of(cfg, opened["train"])
-    features = _sizes(tables)
+    features = feature_sizes(cfg, tables)
     network_spec = _network_spec(cfg, features)
     torch.manual_seed(recipe.train_seed)
     network = ActorCritic(network_spec)
@@ -197,6 +203,11 @@ def _train(policy: Policy) -> None:
     measure = Measure(cfg, opened, protocol)
     curve = Training(spec, network, policy.folder, measure, policy.fingerprint).run()
     best = max(curve, key=lambda point: point[MONITOR])
+    if best is curve[0]:
+        log(
+            f"{policy.folder}: no network was better on validation than the untrained one, which "
+            "is kept; give more algorithm.total_steps, or a smaller algorithm.validate_every"
+        )
     metrics: dict[str, Any] = {f"best/{name}": value for name, value in best.items()}
     metrics |= {f"untrained/{name}": value for name, value in curve[0].items()}
     metrics |= {"features": features, "steps": curve[-1]["steps"]}
@@ -204,16 +215,6 @@ def _train(policy: Policy) -> None:
     policy.finish(
         metrics, {name: plain(cfg, name) for name in ("baseline", "algorithm", "protocol")}
     )
-
-
-def _sizes(tables: SceneBatch) -> dict[str, int]:
-    """Return the sizes of a network's input features, by name."""
-    both = {**tables.visual, **tables.audio}
-    return {
-        name: int(both[name].shape[-1])
-        for name in ("visual_embedding", "audio_embedding")
-        if name in both
-    }
 
 
 def _trajectories(cfg: DictConfig, scenes: Sequence[Scene], tables: SceneBatch) -> Tensor | None:
@@ -254,10 +255,8 @@ class Measure:
     def __call__(self, network: ActorCritic) -> dict[str, float]:
         """Evaluate a network: mean return, success rate and SPL, such as `validation/spl`."""
         metrics = {}
-        given, options = parts(self._cfg), plain(self._cfg, "baseline")
-        options.pop("_target_")
-        options["samples"] = True  # the best network does not depend on how it acts later
-        agent = ActorCriticAgent(network, **options, **given)
+        agent = actor_critic(self._cfg, network)
+        agent.samples = True  # the best network does not depend on how it acts later
         for subset, (scenes, observations) in self._observed.items():
             # `train/` names the metrics of the training steps
             name = "training" if subset == "train" else subset

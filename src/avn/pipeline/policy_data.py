@@ -19,6 +19,7 @@ from avn.pipeline.scenes import Geometry
 from avn.pipeline.sound_network import has_sound_model
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stage import Stage
+from avn.rl.networks import ActorCritic
 
 SUBSETS = ("train", "validation")
 
@@ -32,12 +33,31 @@ def parts(cfg: DictConfig) -> dict[str, Any]:
     }
 
 
+def actor_critic(cfg: DictConfig, network: ActorCritic | None = None) -> ActorCriticAgent:
+    """Build the actor-critic agent of a config, with a network if it shall act."""
+    agent: ActorCriticAgent = build_object("baseline", cfg.baseline, network=network, **parts(cfg))
+    return agent
+
+
+def observation_names(cfg: DictConfig) -> tuple[str, ...]:
+    """Return the names of the observations that the actor-critic of a config needs."""
+    return actor_critic(cfg).wants(build_object("protocol", cfg.protocol))
+
+
+def feature_sizes(cfg: DictConfig, tables: SceneBatch) -> dict[str, int]:
+    """Return the sizes of the features of a config's network, by name, in their order.
+
+    Local patches become a map if the agent has one; they are no features of the network then.
+    """
+    both = {**tables.visual, **tables.audio}
+    mapped = ("local_patch",) if has_occupancy_model(cfg) else ()
+    names = [name for name in observation_names(cfg) if name in both and name not in mapped]
+    return {name: both[name][0].numel() for name in names}
+
+
 def observed(cfg: DictConfig, subset: str) -> Observed:
     """Return the observations of an actor-critic in a subset of the training world."""
-    given = parts(cfg)
-    names = ActorCriticAgent(hears=given["hears"], maps=given["maps"]).wants(
-        build_object("protocol", cfg.protocol)
-    )
+    names = observation_names(cfg)
     clips = Clips("algorithm.realisations", "train") if subset == "train" else Clips()
     return Observed(Apartments(cfg, subset, TRAINING), names, clips)
 

@@ -72,7 +72,8 @@ class ExplorationMemory:
         """Compute the LSTM states of a network after all trajectories."""
 
         def inputs(step: int) -> dict[str, Tensor]:
-            own = {"visual_embedding": self.tables.visual["visual_embedding"][self._flat[:, step]]}
+            states, visual = self._flat[:, step], self.tables.visual
+            own = {name: visual[name][states] for name in network.spec.features if name in visual}
             if self.maps:
                 own["map"] = with_unknown_exploration(self._seen[:, step].float())
             return own

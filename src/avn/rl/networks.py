@@ -108,8 +108,9 @@ class ActorCritic(nn.Module):
             nn.init.zeros_(layer.bias)
 
     def standardise(self, name: str, examples: Tensor) -> None:
-        """Set the mean and scale of a feature from examples, (n, D)."""
-        mean, spread = examples.float().mean(dim=0), examples.float().std(dim=0)
+        """Set the mean and scale of a feature from examples, (n, ...)."""
+        flat = examples.float().flatten(1)
+        mean, spread = flat.mean(dim=0), flat.std(dim=0)
         getattr(self, f"{name}_mean").copy_(mean)
         scale = _LENGTH / (spread.clamp_min(1e-6) * len(mean) ** 0.5)
         getattr(self, f"{name}_scale").copy_(torch.where(spread > 1e-6, scale, 0.0))
@@ -119,9 +120,9 @@ class ActorCritic(nn.Module):
 
         Parameters
         ----------
-        inputs : mapping of str to (N, D) tensor
-            Features by name, and `map` (N, channels, width, width). Missing features, such as
-            audio during exploration, contribute nothing.
+        inputs : mapping of str to (N, ...) tensor
+            Features by name, which are flattened, and `map` (N, channels, width, width). Missing
+            features, such as audio during exploration, contribute nothing.
 
         Returns
         -------
@@ -131,7 +132,8 @@ class ActorCritic(nn.Module):
         for name, encoder in self.encoders.items():
             if name in inputs:
                 mean, scale = getattr(self, f"{name}_mean"), getattr(self, f"{name}_scale")
-                total = total + encoder((inputs[name].to(mean.dtype) - mean) * scale)
+                flat = inputs[name].to(mean.dtype).flatten(1)
+                total = total + encoder((flat - mean) * scale)
         if self.map_encoder is not None:
             around = inputs["map"].to(self.bias.dtype).flatten(1) - _UNKNOWN
             total = total + self.map_encoder(around)
