@@ -330,7 +330,7 @@ def test_a_threshold_of_the_config_needs_no_network():
         (SoundNetwork, "sound_model: 'none' cannot hear; choose cnn5 or released"),
         (StopNetwork, "stop_model: 'none' cannot say Stop; choose cnn5"),
         (OccupancyNetwork, "occupancy_model: 'none' sees no free cells; choose small or released"),
-        (Policy, "agent: 'random_walk' is no actor-critic"),
+        (Policy, "baseline: that of agent 'random_walk' is no actor-critic"),
     ],
 )
 def test_what_a_config_does_not_have_is_refused(kind, line):

@@ -216,3 +216,20 @@ def test_the_best_on_validation_is_kept(flat, rules, tmp_path):
     load_network(network, tmp_path / BEST, "a" * 64)
     best = max(own["validation/spl"] for own in kept.curve)
     assert measure(network)["validation/spl"] == pytest.approx(best)
+
+
+def test_several_gradients_of_a_batch_count_its_actions_once(flat, rules, tmp_path):
+    options = {"total_steps": 600, "validate_every": 300}
+    tables = random_tables([flat], rules)
+    once, twice = (
+        training(make_spec(tables, rules, updates_per_batch=n, **options), tmp_path / str(n))
+        for n in (1, 2)
+    )
+    for run in (once, twice):
+        run.run()
+        assert run.steps == 600
+    assert int(twice.shared.updates) == 2 * int(once.shared.updates)
+    assert not torch.equal(once.shared.weights, twice.shared.weights)
+    again = training(twice.spec, tmp_path / "2")  # which is finished
+    again.run()
+    assert torch.equal(again.shared.weights, twice.shared.weights)
