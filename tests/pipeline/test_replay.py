@@ -103,7 +103,7 @@ def test_a_run_of_another_version_sets_off_no_training(command, outputs, monkeyp
     folder = made(command, outputs, "greedy")
     monkeypatch.setattr(SoundNetwork, "version", 99)
     before = set((outputs / "train").iterdir())
-    with pytest.raises(UserError, match=r"of another version of avn .* is missing and auto=false"):
+    with pytest.raises(UserError, match=r"made with other code.* is missing and auto=false"):
         replay.traces(open_run(folder), [0])
     assert set((outputs / "train").iterdir()) == before
 

@@ -152,6 +152,7 @@ class CoreConfig:
     outputs: str = MISSING
     processes: int = MISSING
     auto: bool = MISSING
+    force: bool = MISSING
 
 
 @dataclass

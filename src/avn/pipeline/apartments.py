@@ -21,7 +21,7 @@ from avn.apartments.splits import PARTS, load_split
 from avn.core.errors import UserError
 from avn.core.files import check_name
 from avn.core.hashing import digest
-from avn.core.settings import typed, values
+from avn.core.settings import typed
 from avn.pipeline.stage import Stage
 
 
@@ -170,12 +170,12 @@ class PerApartment(Stage):
     def fingerprints(self) -> list[str]:
         """Fingerprint of each apartment's file."""
         plans, needs = self.apartments.plans, self.needed
-        settings = values(self.cfg, self.settings(), self.ignored())
+        inputs = self.inputs()
         return [
             digest(
                 self.kind,
                 self.version,
-                settings,
+                inputs,
                 self.content(),
                 self.content_of(plan),
                 [_of_apartment(need, self.apartments, index) for need in needs],
@@ -209,6 +209,11 @@ class PerApartment(Stage):
     def missing(self) -> list[int]:
         """Return the indices of the apartments without a file."""
         return [index for index, path in enumerate(self.paths) if not path.is_file()]
+
+    def discard(self) -> None:
+        """Delete the files of all apartments."""
+        for path in self.paths:
+            path.unlink(missing_ok=True)
 
     def done(self) -> bool:
         """Return whether each apartment has its file."""

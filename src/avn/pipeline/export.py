@@ -19,7 +19,7 @@ from avn.dataset.views import Views
 from avn.pipeline.apartments import apartments_of_all_subsets
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds
-from avn.pipeline.stage import Stage, make, missing
+from avn.pipeline.stage import Stage, discard_if_forced, make, missing, with_needs
 from avn.pipeline.views import RenderedViews
 from avn.reporting.contact_sheet import save_contact_sheet
 from avn.reporting.floor_plan_figure import save_floor_plan
@@ -49,7 +49,9 @@ def generate(cfg: DictConfig) -> Path:
         raise UserError(f"export: '{cfg.export}' is none of {', '.join(EXPORTS)}")
     if cfg.export is None and (cfg.clips or cfg.apartments):
         raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
-    for stage in missing(stages_of(cfg)):
+    stages = stages_of(cfg)
+    discard_if_forced(with_needs(stages))
+    for stage in missing(stages):
         make(stage, explicit=True)
     scenes: list[AudibleScene] = []
     for apartments in apartments_of_all_subsets(cfg):

@@ -25,7 +25,10 @@ from avn.pipeline.stage import MACHINE, build
 
 # Settings that name a run where it differs in them from the others.
 _TELLING = ("protocol", "acoustics", "look", "localisation", "exploration", "seed", "train_seed")
-_OTHER = "the run is of another version of avn or of its networks: run avn.eval again"
+_OTHER = (
+    "it was made with other code, networks or classes of your own; run avn.eval again and give the "
+    "folder that it prints"
+)
 SHOWS = ("typical", "success", "failure")
 
 

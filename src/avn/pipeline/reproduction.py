@@ -17,7 +17,7 @@ from avn.core.progress import format_duration, log
 from avn.pipeline.dashboard import Dashboard
 from avn.pipeline.run import RESULTS, Evaluation, agent_label, read_run
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import make, missing, missing_error, timings
+from avn.pipeline.stage import discard_if_forced, make, missing, missing_error, timings
 from avn.reporting import published, results, table
 from avn.reporting.table import PAPER_PROTOCOL
 
@@ -79,6 +79,7 @@ def _make_runs(configs: Sequence[DictConfig]) -> list[Path]:
     runs = [Evaluation(cfg) for cfg in configs]
     for run in runs:
         run.check()
+    discard_if_forced(runs)
     steps = missing(runs)
     for stage in steps:
         if not (stage.cfg.auto or isinstance(stage, Evaluation)):

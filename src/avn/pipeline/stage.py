@@ -8,6 +8,7 @@ that it does not read follow too.
 
 from __future__ import annotations
 
+import shutil
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,9 +24,10 @@ from avn.core.files import locked
 from avn.core.hashing import digest
 from avn.core.progress import format_duration, log
 from avn.core.settings import leaves, values
+from avn.core.sources import outside_sources
 
 # Settings that every stage reads and that change no product.
-MACHINE = ("outputs", "processes", "auto")
+MACHINE = ("outputs", "processes", "auto", "force")
 # Seconds that this process took for each stage that it made, by title.
 timings: dict[str, float] = {}
 
@@ -127,9 +129,18 @@ class Stage(ABC):
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of all that the product depends on, in hex."""
-        settings = values(self.cfg, self.settings(), self.ignored())
         needed = [need.fingerprint for need in self.needed]
-        return digest(self.kind, self.version, settings, self.content(), needed)
+        return digest(self.kind, self.version, self.inputs(), self.content(), needed)
+
+    def inputs(self) -> list[Any]:
+        """Return the values of the settings, and hashes of the classes from outside among them."""
+        settings = values(self.cfg, self.settings(), self.ignored())
+        sources = outside_sources(settings)
+        return [*settings, sources] if sources else settings
+
+    def discard(self) -> None:
+        """Delete the product, so that it is made anew."""
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def locks(self) -> Sequence[Path]:
         """Return the paths that only one process may write at a time, in a fixed order."""
@@ -137,19 +148,24 @@ class Stage(ABC):
 
     def read(self) -> set[str]:
         """Return the leaf keys of the config that this stage and all its dependencies read."""
-        visited: dict[str, Stage] = {}
-        left: list[Stage] = [self]
-        while left:
-            stage = left.pop()
-            if stage.fingerprint not in visited:
-                visited[stage.fingerprint] = stage
-                left.extend(stage.needed)
-        return set().union(*(stage.read_here() for stage in visited.values()))
+        return set().union(*(stage.read_here() for stage in with_needs([self])))
 
     def read_here(self) -> set[str]:
         """Return the leaf keys of the config that this stage reads, without its dependencies."""
         keys = (*MACHINE, *self.settings(), *self.consulted())
         return leaves(self.cfg, keys, self.ignored())
+
+
+def with_needs(stages: Iterable[Stage]) -> list[Stage]:
+    """Return some stages and all that they depend on, each once."""
+    visited: dict[str, Stage] = {}
+    left = list(stages)
+    while left:
+        stage = left.pop()
+        if stage.fingerprint not in visited:
+            visited[stage.fingerprint] = stage
+            left.extend(stage.needed)
+    return list(visited.values())
 
 
 def missing(stages: Iterable[Stage]) -> list[Stage]:
@@ -194,15 +210,29 @@ def build(stage: Stage, explicit: bool = False) -> None:
     stage : Stage
         Stage to make.
     explicit : bool
-        Whether the user asked for this product: then `auto=false` does not refuse to make it.
+        Whether the user asked for this product: then `auto=false` does not refuse to make it, and
+        `force=true` makes it anew.
 
     Raises
     ------
     UserError
         Where a product is missing and `auto` is false, or settings cannot work.
     """
+    if explicit:
+        discard_if_forced([stage])
     for step in missing([stage]):
         make(step, explicit=explicit and step.fingerprint == stage.fingerprint)
+
+
+def discard_if_forced(stages: Iterable[Stage]) -> None:
+    """Delete finished products whose config has `force=true`."""
+    for stage in stages:
+        if stage.cfg.force and stage.done():
+            stage.check()  # a command that cannot work deletes nothing
+            with ExitStack() as held:
+                for path in stage.locks():
+                    held.enter_context(locked(path, stage.title))
+                stage.discard()
 
 
 def make(stage: Stage, explicit: bool = False) -> None:
