@@ -27,9 +27,10 @@ import pyroomacoustics as pra
 from numpy.typing import NDArray
 
 from avn.acoustics import materials
-from avn.acoustics.brir import AcousticsConfig, render_direct_paths, render_source
+from avn.acoustics.brir import render_direct_paths, render_source
 from avn.acoustics.decay import reverberation_time
 from avn.acoustics.direct_path import band_energies, find_paths
+from avn.acoustics.settings import AcousticsConfig
 from avn.acoustics.tracer import trace
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.generator import generate

@@ -22,9 +22,10 @@ import numpy as np
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
 from avn.apartments.splits import SplitConfig, load_split
-from avn.views.cycles import Cycles, CyclesConfig
-from avn.views.raycast import Raycast, RaycastConfig
+from avn.views.cycles import Cycles
+from avn.views.raycast import Raycast
 from avn.views.scene_mesh import scene_mesh
+from avn.views.settings import CyclesConfig, RaycastConfig
 
 
 def timed(make, *arguments):

@@ -4,11 +4,12 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from avn.acoustics.ambisonics import sh
-from avn.acoustics.brir import AcousticsConfig, combine, render_direct_paths, render_source
+from avn.acoustics.brir import combine, render_direct_paths, render_source
 from avn.acoustics.corners import diffracted_paths, sees
 from avn.acoustics.direct_path import DirectPaths, band_energies, find_paths, screen_loss
 from avn.acoustics.hrtf import load_sh_hrirs
 from avn.acoustics.materials import SPEED_OF_SOUND
+from avn.acoustics.settings import AcousticsConfig
 from avn.apartments.floor_plan import Doorway, FloorPlan, Room
 from avn.apartments.grid import build_grid
 from avn.apartments.surfaces import build_surfaces

@@ -6,7 +6,7 @@ from synthetic_views import synthetic_views
 
 from avn.core.errors import UserError
 from avn.datamodules.views import COARSE, ViewData, ViewSampler, ViewSet
-from avn.modules.view_augment import AugmentConfig
+from avn.modules.settings import AugmentConfig
 
 SAME = AugmentConfig(colour=0, light=0, noise=0, blur=0, erase=0, shift=0)
 

@@ -6,7 +6,7 @@ import torch
 from small import opened
 
 from avn.acoustics import brir
-from avn.acoustics.brir import AcousticsConfig
+from avn.acoustics.settings import AcousticsConfig
 from avn.apartments.generator import generate
 from avn.apartments.surfaces import build_surfaces
 from avn.apartments.walls import walls

@@ -10,8 +10,8 @@ from avn.dataset.build_views import ViewsFile
 from avn.dataset.build_views import build_views as build
 from avn.dataset.views import read_views
 from avn.views.camera import CameraConfig
-from avn.views.lighting import LightConfig
-from avn.views.raycast import Raycast, RaycastConfig
+from avn.views.raycast import Raycast
+from avn.views.settings import LightConfig, RaycastConfig
 
 CFG = RaycastConfig(
     camera=CameraConfig(size=16),

@@ -17,7 +17,8 @@ from avn.modules.sound_cnn import SoundCnn
 from avn.navigation.protocols import Protocol
 from avn.rl.algorithm import Algorithm
 from avn.rl.rollouts import advantages_and_targets, trunk_outputs
-from avn.views.renderer import Renderer, RendererConfig
+from avn.views.renderer import Renderer
+from avn.views.settings import RendererConfig
 
 
 class DeepSound(SoundCnn):

@@ -14,8 +14,8 @@ from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.datamodules.views import ViewData
 from avn.modules.occupancy_cnn import OccupancyCnn
+from avn.modules.settings import AugmentConfig
 from avn.modules.training import BEST, LAST, fit, load_weights
-from avn.modules.view_augment import AugmentConfig
 from avn.reporting.local_patch_figures import LocalPatchFigures
 
 

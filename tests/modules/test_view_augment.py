@@ -1,7 +1,8 @@
 import pytest
 import torch
 
-from avn.modules.view_augment import AugmentConfig, augment
+from avn.modules.settings import AugmentConfig
+from avn.modules.view_augment import augment
 
 NOTHING = {"colour": 0.0, "light": 0.0, "noise": 0.0, "blur": 0.0, "erase": 0, "shift": 0}
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from small import opened
 
-from avn.acoustics.brir import AcousticsConfig
+from avn.acoustics.settings import AcousticsConfig
 from avn.agents.oracle import Oracle
 from avn.agents.random_walk import RandomWalk
 from avn.agents.rollout import Labels, rollout_scene

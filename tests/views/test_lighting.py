@@ -5,9 +5,10 @@ import pytest
 
 from avn.views import lighting
 from avn.views.light_points import choose_points, normals_of
-from avn.views.lighting import LightConfig, bake
+from avn.views.lighting import bake
 from avn.views.lights import Lamps, Panes
 from avn.views.mesh import Mesh, boxes, join, split
+from avn.views.settings import LightConfig
 
 NO_PANES = Panes(*(np.zeros((0, 3)) for _ in range(5)))
 

@@ -11,10 +11,9 @@ from typing import Any
 
 from omegaconf import II, MISSING
 
-from avn.acoustics.brir import AcousticsConfig
+from avn.acoustics.settings import AcousticsConfig
 from avn.apartments.splits import SplitConfig
-from avn.views.backbone import BackboneConfig
-from avn.views.renderer import RendererConfig
+from avn.views.settings import BackboneConfig, RendererConfig
 
 _TEST_SPLIT: Any = II("split")
 _TEST_ACOUSTICS: Any = II("acoustics")

@@ -16,7 +16,8 @@ from torch.utils.data import Dataset, Sampler
 from avn.core.errors import UserError
 from avn.core.prefetch import PrefetchLoader
 from avn.modules.occupancy_cnn import ViewBatch
-from avn.modules.view_augment import AugmentConfig, augment
+from avn.modules.settings import AugmentConfig
+from avn.modules.view_augment import augment
 
 # Seed of the views on which networks are validated; the same for every `train_seed`.
 VALIDATION_SEED = 0

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.acoustics import brir
-from avn.acoustics.brir import AcousticsConfig
 from avn.acoustics.direct_path import DirectPaths
 from avn.acoustics.materials import NAMES
+from avn.acoustics.settings import AcousticsConfig
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import Grid, build_grid, source_cells
 from avn.apartments.surfaces import build_surfaces, line_of_sight

@@ -22,7 +22,8 @@ from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene_file
 from avn.dataset.views import KIND, VERSION
-from avn.views.renderer import Prepared, Renderer, RendererConfig, renderer_class
+from avn.views.renderer import Prepared, Renderer, renderer_class
+from avn.views.settings import RendererConfig
 
 # Views that are rendered, kept and counted together.
 _CHUNK = 40

@@ -8,7 +8,8 @@ import torch
 from torch import Tensor
 
 from avn.core.classes import build_part
-from avn.modules.network import Network, OptimizerConfig, Part, as_part
+from avn.modules.network import Network, Part, as_part
+from avn.modules.settings import OptimizerConfig
 from avn.modules.spectrogram import Spectrogram
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import lightning as L
@@ -23,25 +22,6 @@ SUBSETS = ("validation", "train")
 
 # Config of a submodule: `_target_` and arguments of that class.
 Part = dict[str, Any]
-
-
-@dataclass
-class OptimizerConfig:
-    """Optimiser: a class of torch.optim that takes `lr` and `weight_decay`.
-
-    Attributes
-    ----------
-    _target_ : str
-        Module and name of the optimiser's class.
-    lr : float
-        Peak learning rate.
-    weight_decay : float
-        Weight decay coefficient.
-    """
-
-    _target_: str = "torch.optim.AdamW"
-    lr: float = 2e-3
-    weight_decay: float = 1e-2
 
 
 def as_part(config: Any) -> Part:

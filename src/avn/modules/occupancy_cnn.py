@@ -10,8 +10,8 @@ from torchmetrics import MeanMetric
 
 from avn.core.errors import UserError
 from avn.modules.local_patch_metrics import LocalPatchScores, calibrated, calibration
-from avn.modules.network import SUBSETS, Network, OptimizerConfig, Part, as_part
-from avn.modules.view_augment import AugmentConfig
+from avn.modules.network import SUBSETS, Network, Part, as_part
+from avn.modules.settings import AugmentConfig, OptimizerConfig
 from avn.views.camera import CameraConfig
 
 

@@ -3,38 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
-
-@dataclass
-class AugmentConfig:
-    """Strength of each image augmentation of training views; 0 turns one off.
-
-    Attributes
-    ----------
-    colour : float
-        Range of hue rotation, saturation and channel gain, 0 to 1; 1 allows any hue.
-    light : float
-        Range of brightness, contrast and gamma, in factors of up to 2^0.7 at 1.
-    noise : float
-        Maximum standard deviation of Gaussian noise, where pixel values are 0 to 1.
-    blur : float
-        Probability that a picture is blurred.
-    erase : int
-        Number of random rectangles that are painted over.
-    shift : int
-        Maximum translation in pixels.
-    """
-
-    colour: float = 1.0
-    light: float = 1.0
-    noise: float = 0.04
-    blur: float = 0.3
-    erase: int = 2
-    shift: int = 2
+from avn.modules.settings import AugmentConfig
 
 
 def augment(pictures: Tensor, config: AugmentConfig, generator: torch.Generator) -> Tensor:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from avn.acoustics import brir
-from avn.acoustics.brir import AcousticsConfig, check_config
+from avn.acoustics.brir import check_config
+from avn.acoustics.settings import AcousticsConfig
 from avn.apartments.floor_plan import FloorPlan
 from avn.core.files import check_name
 from avn.core.settings import typed

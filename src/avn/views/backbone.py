@@ -11,7 +11,6 @@ import importlib
 import importlib.util
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from multiprocessing.pool import ThreadPool
 from pathlib import Path
 
@@ -23,31 +22,12 @@ from torch.nn.functional import interpolate, normalize
 from avn.core.classes import import_class
 from avn.core.errors import UserError
 from avn.core.hashing import digest, file_hash
+from avn.views.settings import BackboneConfig
 
 # Increased when a change of the code changes the features.
 VERSION = 1
 # Views a batch. Intermediate layers fit into the cache: twice as fast as 64 on a CPU.
 _BATCH = 16
-
-
-@dataclass
-class BackboneConfig:
-    """The config group `backbone`.
-
-    Attributes
-    ----------
-    name : str
-        Part of the name of the file of features.
-    size : int
-        Side in pixels to which views are resized before they enter the network.
-    source : str, optional
-        ResNets only: name on the Hugging Face hub, or a folder with `config.json` and weights.
-    """
-
-    _target_: str = "avn.views.backbone.EfficientNetLite0"
-    name: str = "efficientnet_lite0"
-    size: int = 128
-    source: str | None = None
 
 
 class Backbone(ABC):

@@ -12,7 +12,6 @@ import importlib.util
 import math
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -22,44 +21,18 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import FloorPlan
 from avn.core.errors import UserError
 from avn.views import shading
-from avn.views.lighting import LightConfig
 from avn.views.ray_camera import RayCamera
-from avn.views.raycast import Raycast, RaycastConfig
+from avn.views.raycast import Raycast
 from avn.views.rays import Triangles
-from avn.views.renderer import Prepared, Renderer, RendererConfig, check_light, check_range
+from avn.views.renderer import Prepared, Renderer, check_light, check_range
 from avn.views.scene_mesh import SceneMesh, scene_mesh
+from avn.views.settings import CyclesConfig, RaycastConfig, RendererConfig
 
 _INSTALL = (
     "renderer=cycles: Blender's module bpy {}; `pip install 'avn[render]'`, on a bare Debian also "
     "libx11-6 libxext6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1, or use "
     "renderer=raycast"
 )
-
-
-@dataclass
-class CyclesConfig(RendererConfig):
-    """Settings of `renderer=cycles`.
-
-    Attributes
-    ----------
-    samples : int
-        Light paths a pixel.
-    bounces : int
-        Maximum number of light bounces.
-    denoise : bool
-        Apply Open Image Denoise to each image.
-    light : LightConfig
-        Settings of the baked light, from which only the exposure is computed.
-    """
-
-    _target_: str = "avn.views.cycles.Cycles"
-    name: str = "cycles"
-    samples: int = 16
-    bounces: int = 3
-    denoise: bool = True
-    light: LightConfig = field(
-        default_factory=lambda: LightConfig(spacing=0.25, shadow_rays=4, gather_rays=16)
-    )
 
 
 class Cycles(Renderer):

@@ -9,8 +9,6 @@ vertices, which also smooths it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,37 +18,13 @@ from avn.views.light_points import Points, normals_of
 from avn.views.lights import Lamps, Panes
 from avn.views.mesh import Mesh
 from avn.views.rays import Triangles
+from avn.views.settings import LightConfig
 
 # Rays that are processed at once, which bounds the memory.
 _AT_ONCE = 1 << 20
 # A point is enclosed if its first _FEW rays all end within _NARROW metres.
 _FEW = 12
 _NARROW = 0.5
-
-
-@dataclass
-class LightConfig:
-    """Resolution and sampling of the baked light.
-
-    Attributes
-    ----------
-    spacing : float
-        Metres between sample points.
-    shadow_rays : int
-        Shadow rays per sample point and light source.
-    gather_rays : int
-        Rays per sample point for indirect light.
-    bounces : int
-        Number of indirect bounces.
-    smoothing : int
-        Number of smoothing passes over the indirect light.
-    """
-
-    spacing: float = 0.07
-    shadow_rays: int = 12
-    gather_rays: int = 64
-    bounces: int = 5
-    smoothing: int = 2
 
 
 def bake(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,35 +10,18 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import FloorPlan
 from avn.views import shading
 from avn.views.light_points import choose_points, normals_of
-from avn.views.lighting import LightConfig, bake
+from avn.views.lighting import bake
 from avn.views.mesh import BUILDING, split
 from avn.views.ray_camera import RayCamera
 from avn.views.rays import Triangles
-from avn.views.renderer import Prepared, Renderer, RendererConfig, check_light, check_range
+from avn.views.renderer import Prepared, Renderer, check_light, check_range
 from avn.views.scene_mesh import scene_mesh
+from avn.views.settings import RaycastConfig, RendererConfig
 
 # Pyramid level of a texture from which the albedo of a triangle is sampled.
 _COARSE = 4
 # Log-average luminance to which images are exposed.
 _KEY = 0.42
-
-
-@dataclass
-class RaycastConfig(RendererConfig):
-    """Settings of `renderer=raycast`.
-
-    Attributes
-    ----------
-    samples : int
-        Rays along each side of a pixel.
-    light : LightConfig
-        Settings of the baked light.
-    """
-
-    _target_: str = "avn.views.raycast.Raycast"
-    name: str = "raycast"
-    samples: int = 2
-    light: LightConfig = field(default_factory=LightConfig)
 
 
 class Raycast(Renderer):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,27 +10,9 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import CEILING, FloorPlan
 from avn.core.classes import import_class
 from avn.core.errors import UserError
-from avn.views.camera import CameraConfig
-from avn.views.lighting import LightConfig
+from avn.views.settings import LightConfig, RendererConfig
 
 Prepared = dict[str, NDArray]
-
-
-@dataclass
-class RendererConfig:
-    """The config group `renderer`: settings of all renderers.
-
-    Attributes
-    ----------
-    name : str
-        Part of the name of the file of views.
-    camera : CameraConfig
-        The agent's camera.
-    """
-
-    _target_: str = ""
-    name: str = ""
-    camera: CameraConfig = field(default_factory=CameraConfig)
 
 
 class Renderer(ABC):

@@ -14,7 +14,8 @@ import torch
 
 from avn.core.errors import UserError
 from avn.core.hashing import digest, file_hash
-from avn.views.backbone import Backbone, BackboneConfig, first_line
+from avn.views.backbone import Backbone, first_line
+from avn.views.settings import BackboneConfig
 
 # Channel means and standard deviations of the ResNets' training images, 0 to 1.
 _MEAN, _STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
