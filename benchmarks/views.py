@@ -21,7 +21,8 @@ import numpy as np
 
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
-from avn.apartments.splits import SplitConfig, load_split
+from avn.apartments.settings import SplitConfig
+from avn.apartments.splits import load_split
 from avn.views.cycles import Cycles
 from avn.views.raycast import Raycast
 from avn.views.scene_mesh import scene_mesh

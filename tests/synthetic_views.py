@@ -4,7 +4,7 @@ import numpy as np
 
 from avn.datamodules.views import ApartmentViews
 from avn.modules.window_net import probe_places
-from avn.views.camera import CameraConfig
+from avn.views.settings import CameraConfig
 
 
 def synthetic_views(count: int, seed: int, size: int = 32, appearances: int = 1) -> ApartmentViews:

@@ -12,7 +12,8 @@ import pytest
 from avn.apartments.floor_plan import CELL, FloorPlan, Piece, Room, from_dict
 from avn.apartments.generator import SIZES, generate
 from avn.apartments.grid import Grid, build_grid
-from avn.apartments.splits import SplitConfig, load_split
+from avn.apartments.settings import SplitConfig
+from avn.apartments.splits import load_split
 from avn.apartments.symmetry import layout_key
 from avn.core.errors import UserError
 

@@ -10,7 +10,8 @@ import yaml
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid
-from avn.apartments.splits import FROZEN, SplitConfig, load_split
+from avn.apartments.settings import SplitConfig
+from avn.apartments.splits import FROZEN, load_split
 from avn.apartments.symmetry import layout_key
 from avn.core.errors import UserError
 

@@ -9,7 +9,8 @@ import pytest
 
 from avn.apartments.floor_plan import Doorway, FloorPlan
 from avn.apartments.generator import generate
-from avn.apartments.splits import SplitConfig, load_split
+from avn.apartments.settings import SplitConfig
+from avn.apartments.splits import load_split
 from avn.apartments.symmetry import layout_key, layout_similarity
 
 

@@ -9,9 +9,8 @@ from avn.core.errors import UserError
 from avn.dataset.build_views import ViewsFile
 from avn.dataset.build_views import build_views as build
 from avn.dataset.views import read_views
-from avn.views.camera import CameraConfig
 from avn.views.raycast import Raycast
-from avn.views.settings import LightConfig, RaycastConfig
+from avn.views.settings import CameraConfig, LightConfig, RaycastConfig
 
 CFG = RaycastConfig(
     camera=CameraConfig(size=16),

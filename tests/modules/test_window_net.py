@@ -6,7 +6,8 @@ from avn.apartments.floor_plan import CELL
 from avn.apartments.local_patch import window_offsets
 from avn.core.errors import UserError
 from avn.modules.window_net import PROBES, WindowNet, probe_places
-from avn.views.camera import CameraConfig, ray_directions
+from avn.views.camera import ray_directions
+from avn.views.settings import CameraConfig
 
 
 def test_probes_lie_in_the_pixels_whose_rays_meet_them() -> None:

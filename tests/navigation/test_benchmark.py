@@ -9,7 +9,8 @@ from avn.acoustics.settings import AcousticsConfig
 from avn.agents.oracle import Oracle
 from avn.agents.random_walk import RandomWalk
 from avn.agents.rollout import Labels, rollout_scene
-from avn.apartments.splits import SplitConfig, load_split
+from avn.apartments.settings import SplitConfig
+from avn.apartments.splits import load_split
 from avn.navigation.episodes import exhaustive_episodes, frozen_episodes
 from avn.navigation.protocols import Protocol
 from avn.reporting.results import headline, summarise

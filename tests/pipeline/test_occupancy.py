@@ -8,7 +8,7 @@ from synthetic_scene import synthetic_scene
 from avn.modules.local_patch_metrics import local_patch_metrics
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.occupancy import LocalPatches, local_patch_errors, true_local_patches
-from avn.views.camera import CameraConfig
+from avn.views.settings import CameraConfig
 
 
 def test_errors_are_of_each_scene_and_of_all():

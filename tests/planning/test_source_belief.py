@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from avn.core.errors import UserError
-from avn.planning.source_belief import SourceBelief, SourceErrorModel
+from avn.planning.settings import SourceErrorModel
+from avn.planning.source_belief import SourceBelief
 
 YES = np.array([True])
 

@@ -8,7 +8,8 @@ from hardness import hardness, random_walk_odds
 
 from avn.apartments.floor_plan import Doorway, FloorPlan, Room
 from avn.apartments.grid import build_grid, goal_cells
-from avn.apartments.splits import SplitConfig, load_split
+from avn.apartments.settings import SplitConfig
+from avn.apartments.splits import load_split
 
 FINISH = {"floor": "parquet", "walls": "plaster", "ceiling": "ceiling_plaster"}
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from avn.core.errors import UserError
-from avn.views.camera import CameraConfig, ray_directions
+from avn.views.camera import ray_directions
+from avn.views.settings import CameraConfig
 
 FORWARD = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 RIGHT = np.array([(1, 0), (0, -1), (-1, 0), (0, 1)])

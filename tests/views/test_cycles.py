@@ -7,10 +7,9 @@ import pytest
 
 from avn.apartments.floor_plan import FloorPlan, Lamp, Room, Window
 from avn.core.errors import UserError
-from avn.views.camera import CameraConfig
 from avn.views.cycles import Cycles
 from avn.views.raycast import Raycast
-from avn.views.settings import CyclesConfig, LightConfig, RaycastConfig
+from avn.views.settings import CameraConfig, CyclesConfig, LightConfig, RaycastConfig
 
 blender = pytest.mark.skipif(
     importlib.util.find_spec("bpy") is None, reason="Blender's module bpy is not installed"

@@ -14,7 +14,8 @@ import pytest
 import yaml
 
 from avn.apartments.floor_plan import FloorPlan, Piece, Room
-from avn.apartments.splits import PARTS, SplitConfig, load_split
+from avn.apartments.settings import SplitConfig
+from avn.apartments.splits import PARTS, load_split
 from avn.views import furniture_models
 from avn.views.furniture_models import FOLDER, assets_hash, catalogue, load_model
 from avn.views.models import choose, copies, distortion, furniture_mesh

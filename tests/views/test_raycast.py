@@ -6,10 +6,10 @@ import pytest
 from avn.apartments.floor_plan import CEILING, FloorPlan, Lamp, Room, Window
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
-from avn.views.camera import CameraConfig, ray_directions
+from avn.views.camera import ray_directions
 from avn.views.raycast import Raycast
 from avn.views.rays import Triangles
-from avn.views.settings import LightConfig, RaycastConfig
+from avn.views.settings import CameraConfig, LightConfig, RaycastConfig
 
 ROUGH = LightConfig(spacing=0.25, shadow_rays=2, gather_rays=8, bounces=2)
 

@@ -18,8 +18,9 @@ from avn.core.pose import turned
 from avn.mapping.base import Mapper
 from avn.navigation.protocols import Protocol
 from avn.planning.partial_graph import GraphRules
+from avn.planning.settings import SourceErrorModel
 from avn.planning.shortest_path import NO_ACTION, first_actions
-from avn.planning.source_belief import SourceBelief, SourceErrorModel
+from avn.planning.source_belief import SourceBelief
 
 if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from avn.apartments.floor_plan import FloorPlan, load
 from avn.apartments.generator import SIZES, generate
+from avn.apartments.settings import SplitConfig
 from avn.apartments.symmetry import layout_key
 from avn.core.errors import UserError
 
@@ -14,38 +14,6 @@ PARTS = ("train", "validation", "test")
 FROZEN = Path(__file__).parents[1] / "assets" / "floor_plans"
 # Seeds that are tried for one apartment of a new layout.
 _ATTEMPTS = 200
-
-
-@dataclass
-class SplitConfig:
-    """Settings of the config group `split`.
-
-    Attributes
-    ----------
-    name : str
-        Name of the split, as in the names of runs.
-    folder : str, optional
-        Frozen floor plans: a folder under the package's `assets/floor_plans`, or any folder.
-        Files `train_*.json`, `val_*.json`; all others are test apartments.
-    seed : int
-        First seed of the generator; ignored with a folder.
-    size : str
-        Size of generated apartments, a key of `avn.apartments.generator.SIZES`.
-    train, validation, test : int
-        Number of apartments to generate; ignored with a folder.
-    train_sources, sources : int
-        Number of source cells of each training apartment, and of each other one.
-    """
-
-    name: str = "var"
-    folder: str | None = None
-    seed: int = 0
-    size: str = "mixed"
-    train: int = 2
-    validation: int = 3
-    test: int = 5
-    train_sources: int = 10
-    sources: int = 5
 
 
 def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:

@@ -16,7 +16,7 @@ from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import DictConfig, ListConfig, OmegaConf, open_dict
 
-from avn.apartments.splits import SplitConfig
+from avn.apartments.settings import SplitConfig
 from avn.config.folder import conf_folder, without_folders
 from avn.config.renamed import check_file
 from avn.config.schema import BASES, SCHEMAS

@@ -12,7 +12,7 @@ from typing import Any
 from omegaconf import II, MISSING
 
 from avn.acoustics.settings import AcousticsConfig
-from avn.apartments.splits import SplitConfig
+from avn.apartments.settings import SplitConfig
 from avn.views.settings import BackboneConfig, RendererConfig
 
 _TEST_SPLIT: Any = II("split")

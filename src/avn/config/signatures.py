@@ -20,6 +20,7 @@ from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from avn.config.schema import BASES, GIVEN, LINKED
+from avn.config.signature_table import Parameters, known_parameters
 from avn.core.classes import import_class, parameters
 from avn.core.errors import UserError
 
@@ -96,28 +97,45 @@ def schema_of(group: str, target: str | None) -> Any:
 def _signature(
     where: str, target: str, given: tuple[str, ...], base: Any = object, linked: bool = False
 ) -> Any:
+    if known_parameters(target) is not None:
+        return _built_in(target, given, base, linked)
     cls = import_class(f"{where}.{_TARGET}", target)
-    return _settings(cls, target, given, base, linked)
+    return _imported(cls, target, given, base, linked)
 
 
-@cache  # OmegaConf merges only instances of the same class
-def _settings(cls: Any, target: str, given: tuple[str, ...], base: Any, linked: bool) -> Any:
-    known = parameters(cls)
+# OmegaConf merges only instances of the same class, so each is made once.
+
+
+@cache
+def _built_in(target: str, given: tuple[str, ...], base: Any, linked: bool) -> Any:
+    known = known_parameters(target)
+    assert known is not None
+    return _settings(known, target, given, base, linked)
+
+
+@cache
+def _imported(cls: Any, target: str, given: tuple[str, ...], base: Any, linked: bool) -> Any:
+    return _settings(parameters(cls), target, given, base, linked)
+
+
+def _settings(
+    known: Parameters, target: str, given: tuple[str, ...], base: Any, linked: bool
+) -> Any:
     if "cfg" in known and dataclasses.is_dataclass(known["cfg"][0]):
         return known["cfg"][0]  # renderers and backbones take a dataclass
     inherited = {field.name for field in dataclasses.fields(base)} if base is not object else ()
     fields: list[Any] = [
-        (name, _kind(hint), _field(hint, LINKED.get(name, default) if linked else default))
+        (name, schema_type(hint), _field(hint, LINKED.get(name, default) if linked else default))
         for name, (hint, default) in known.items()
         if name not in given and (name not in inherited or isinstance(default, _PLAIN))
     ]
     fields.append((_TARGET, str, dataclasses.field(default=target)))
     bases = () if base is object else (base,)
-    return dataclasses.make_dataclass(f"{cls.__name__}Settings", fields, bases=bases)
+    return dataclasses.make_dataclass(f"{target.split('.')[-1]}Settings", fields, bases=bases)
 
 
 def _field(hint: Any, default: Any) -> Any:
-    nested = _kind(hint)
+    nested = schema_type(hint)
     if isinstance(default, list | dict | tuple | set):
         plain = list(default) if isinstance(default, tuple | set) else default
         return dataclasses.field(default_factory=lambda: plain.copy())
@@ -131,13 +149,13 @@ def _field(hint: Any, default: Any) -> Any:
     return dataclasses.field(default=default)
 
 
-def _kind(hint: Any) -> Any:
-    """Return the type as OmegaConf supports it, else `Any`."""
+def schema_type(hint: Any) -> Any:
+    """Return a type as OmegaConf supports it, else `Any`."""
     if hint in _PLAIN or dataclasses.is_dataclass(hint):
         return hint
     arguments = typing.get_args(hint)
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
-        known = [kind for argument in arguments if (kind := _kind(argument)) is not Any]
+        known = [kind for argument in arguments if (kind := schema_type(argument)) is not Any]
         if len(known) != 1:
             return Any
         optional = type(None) in arguments and not dataclasses.is_dataclass(known[0])

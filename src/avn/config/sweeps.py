@@ -15,14 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
-
-from avn.core.files import stage_folder
-from avn.core.hashing import digest
-from avn.core.progress import log
-from avn.reporting.results import AVERAGE, across_seeds, read_csv, write_csv
 
 _RECORDS = "AVN_SWEEP_RECORDS"
 
@@ -71,15 +65,10 @@ def end(name: str) -> int:
     folder = Path(os.environ[_RECORDS])
     records = [json.loads(path.read_text()) for path in sorted(folder.iterdir())]
     failed = [record for record in records if record["error"]]
-    summary = _spread(records)
-    if len(summary):
-        _print(summary)
-        outputs = Path(next(record["outputs"] for record in records if record["folder"]))
-        done = [Path(r["folder"]).relative_to(outputs).as_posix() for r in records if r["folder"]]
-        path = stage_folder(outputs, "eval", "sweeps/sweep", digest(done)) / "results.csv"
-        write_csv(summary, path)
-        if not failed:
-            log(str(path.parent))
+    if any(record["folder"] for record in records):
+        from avn.config.sweep_summary import summarise  # imports pandas
+
+        summarise(records, tell_folder=not failed)
     for record in failed:
         print(f"{name}: failed: {record['overrides']}: {record['error']}", file=sys.stderr)
     if failed:
@@ -91,25 +80,3 @@ def forget() -> None:
     """Remove the records of a sweep."""
     if folder := os.environ.pop(_RECORDS, None):
         shutil.rmtree(folder)
-
-
-def _spread(records: list[dict[str, Any]]) -> pd.DataFrame:
-    """Return mean and standard deviation over seeds, for each setting of the other keys."""
-    tables: dict[str, list[pd.DataFrame]] = {}
-    for record in records:
-        path = Path(record["folder"] or "") / "results.csv"
-        if record["folder"] and path.is_file():
-            tables.setdefault(record["setting"], []).append(read_csv(path))
-    spreads = [across_seeds(pd.concat(runs)).assign(setting=key) for key, runs in tables.items()]
-    return pd.concat(spreads, ignore_index=True) if spreads else pd.DataFrame()
-
-
-def _print(summary: pd.DataFrame) -> None:
-    for row in summary[summary["scene"] == AVERAGE].to_dict("records"):
-        metrics = ", ".join(
-            f"{metric.upper()} {100 * row[metric]:.1f}"
-            + (f" +- {100 * row[metric + '_std']:.1f} %" if row["seeds"] > 1 else " %")
-            for metric in ("sr", "spl")
-        )
-        labels = f"{row['agent']}, {row['sound']} ({row['setting'] or 'defaults'})"
-        log(f"{labels}, {row['seeds']} seeds: {metrics}")

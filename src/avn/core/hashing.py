@@ -9,7 +9,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from omegaconf import DictConfig, ListConfig, OmegaConf
 
 
@@ -39,6 +38,6 @@ def _plain(value: Any) -> Any:
         return OmegaConf.to_container(value, resolve=True)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return dataclasses.asdict(value)
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "tobytes") and hasattr(value, "dtype"):  # an array; numpy is not imported
         return [str(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
     raise TypeError(f"cannot hash a {type(value).__name__}")

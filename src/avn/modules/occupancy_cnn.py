@@ -12,7 +12,7 @@ from avn.core.errors import UserError
 from avn.modules.local_patch_metrics import LocalPatchScores, calibrated, calibration
 from avn.modules.network import SUBSETS, Network, Part, as_part
 from avn.modules.settings import AugmentConfig, OptimizerConfig
-from avn.views.camera import CameraConfig
+from avn.views.settings import CameraConfig
 
 
 class ViewBatch(TypedDict):

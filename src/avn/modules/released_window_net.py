@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from avn.apartments.local_patch import WINDOW
 from avn.core.errors import UserError
-from avn.views.camera import CameraConfig
+from avn.views.settings import CameraConfig
 
 OUTPUTS = 2
 

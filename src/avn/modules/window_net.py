@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from avn.apartments.floor_plan import CELL
 from avn.apartments.local_patch import WINDOW, window_offsets
 from avn.core.errors import UserError
-from avn.views.camera import CameraConfig
+from avn.views.settings import CameraConfig
 
 # Sampling points of a cell, in metres: right and front of its centre, height over the floor.
 PROBES = (

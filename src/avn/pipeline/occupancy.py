@@ -29,8 +29,8 @@ from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.trained import Fitted
 from avn.pipeline.views import RenderedViews
 from avn.reporting.local_patch_figures import LocalPatchFigures
-from avn.views.camera import CameraConfig
 from avn.views.local_patch_visibility import visible_cells
+from avn.views.settings import CameraConfig
 
 # Views of a batch at inference.
 BATCH = 64

@@ -3,34 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.errors import UserError
-
-
-@dataclass
-class CameraConfig:
-    """Pinhole camera with square images, at the centre of the agent's cell.
-
-    Attributes
-    ----------
-    height : float
-        Metres above the floor.
-    pitch : float
-        Pitch angle in degrees; negative points the camera down.
-    fov : float
-        Horizontal field of view in degrees.
-    size : int
-        Image side in pixels.
-    """
-
-    height: float = 1.5
-    pitch: float = -30.0
-    fov: float = 90.0
-    size: int = 128
+from avn.views.settings import CameraConfig
 
 
 def ray_directions(

@@ -11,7 +11,8 @@ from avn.apartments.grid import Grid
 from avn.apartments.local_patch import SIDE, WINDOW
 from avn.apartments.surfaces import Surfaces
 from avn.apartments.walls import HEADROOM
-from avn.views.camera import CameraConfig, ray_directions
+from avn.views.camera import ray_directions
+from avn.views.settings import CameraConfig
 
 # Rays along the image side; a cell ahead of the agent is at least 3 rays wide.
 RAYS = 40

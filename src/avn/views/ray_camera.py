@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.views.camera import CameraConfig, ray_directions
+from avn.views.camera import ray_directions
 from avn.views.rays import Hits, Triangles
+from avn.views.settings import CameraConfig
 
 
 class RayCamera:
