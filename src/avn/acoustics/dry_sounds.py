@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import soundfile
 from numpy.typing import NDArray
-from scipy.signal import resample_poly
 
 from avn.acoustics.audio_files import missing_part
 from avn.core.errors import UserError
@@ -52,6 +51,8 @@ def read_sound(path: str | Path, rate: int = RATE) -> NDArray[np.float32]:
         (as a whole, after mixing of its channels, or below half the rate), or has samples that are
         not finite.
     """
+    from scipy.signal import resample_poly
+
     content = _content(str(path))
     samples, file_rate = _decode(content, str(path))
     mixed = samples.mean(axis=1)

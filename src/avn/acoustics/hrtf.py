@@ -13,7 +13,6 @@ from math import gcd
 import numpy as np
 import soundfile
 from numpy.typing import NDArray
-from scipy.signal import resample_poly
 
 from avn.acoustics.ambisonics import CHANNELS, DEGREES, rotation_to_heading, sh
 
@@ -72,6 +71,8 @@ class ShHrirs:
 
     def _resampled(self, rate: int) -> NDArray[np.float64]:
         """Resample the responses of the left and the right ear to a rate in Hz, (2, 16, taps)."""
+        from scipy.signal import resample_poly
+
         common = gcd(rate, self.rate)
         up, down = rate // common, self.rate // common
         # `resample_poly` keeps the amplitude of an impulse response; to keep the spectrum, the

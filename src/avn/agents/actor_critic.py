@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
@@ -14,8 +13,12 @@ from avn.core.errors import UserError
 from avn.mapping.ego_map import WIDTH, EgoMap, around, offsets
 from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.navigation.protocols import Protocol
-from avn.rl.exploration_memory import explore_all, with_unknown_exploration
-from avn.rl.networks import ActorCritic, first_of
+
+if TYPE_CHECKING:
+    from avn.rl.networks import ActorCritic
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 
 class ActorCriticAgent(Agent):
@@ -90,6 +93,8 @@ class ActorCriticAgent(Agent):
     @torch.no_grad()
     def explore(self, trajectories: TensorDict, trajectory_index: Tensor) -> None:
         """Run the network along the trajectories without audio. See `Agent.explore`."""
+        from avn.rl.exploration_memory import explore_all, with_unknown_exploration
+
         count, steps = trajectories.batch_size
         ego = EgoMap(count, self.map_size, self.map_width) if self.maps else None
 
@@ -139,6 +144,8 @@ class ActorCriticAgent(Agent):
     @torch.no_grad()
     def _chosen(self, observation: TensorDict, race: Tensor) -> Tensor:
         """Choose actions for the episodes in the batch of the network."""
+        from avn.rl.networks import first_of
+
         network = self._trained()
         seen = {name: observation[name] for name in network.spec.features}
         if self._map is not None:

@@ -6,10 +6,12 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.navigation.protocols import Protocol
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
@@ -11,6 +12,9 @@ from avn.apartments.floor_plan import CELL
 from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT, STOP
 from avn.core.errors import UserError
 from avn.navigation.protocols import Protocol
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 
 class Greedy(Agent):

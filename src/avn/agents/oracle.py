@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
 from avn.core.actions import ACTIONS, HEADINGS, MOVES, STOP
 from avn.navigation.distances import fewest_actions
 from avn.navigation.simulator import Simulator
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 
 class Oracle(Agent):

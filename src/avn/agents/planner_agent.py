@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
@@ -21,6 +20,9 @@ from avn.planning.partial_graph import GraphRules
 from avn.planning.settings import SourceErrorModel
 from avn.planning.shortest_path import NO_ACTION, first_actions
 from avn.planning.source_belief import SourceBelief
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator

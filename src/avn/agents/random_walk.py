@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 
 class RandomWalk(Agent):

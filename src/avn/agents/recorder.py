@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
@@ -18,6 +17,9 @@ from avn.core.pose import FRONT, RIGHT, turned
 from avn.mapping.base import Mapper
 from avn.navigation.simulator import Simulator, drawn_realisations
 from avn.navigation.trace import BeliefTrace, Trace
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 # Squares beyond the outermost cells in the drawn part of a map.
 MARGIN = 2

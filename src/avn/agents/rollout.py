@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.base import Agent
@@ -24,9 +24,12 @@ from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 
+if TYPE_CHECKING:
+    from tensordict import TensorDict
+
 # Callback of a rollout. Its arguments are the simulator, the agent, the observation and the actions
 # that follow, which are None after the last step. The rollout ends if it returns True.
-Watch = Callable[[Simulator, Agent, TensorDict, Tensor | None], bool]
+Watch = Callable[[Simulator, Agent, "TensorDict", Tensor | None], bool]
 
 
 @dataclass(frozen=True)

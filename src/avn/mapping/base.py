@@ -5,11 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.core.errors import UserError
 from avn.planning.partial_graph import GraphRules, PartialGraph
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator

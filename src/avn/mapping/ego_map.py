@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numba
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.core.actions import BACKWARD, HEADINGS
@@ -14,6 +15,9 @@ from avn.core.errors import UserError
 from avn.core.pose import turned
 from avn.mapping.occupancy_map import OccupancyMap
 from avn.mapping.occupancy_mapper import update_map
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 WIDTH = 21
 

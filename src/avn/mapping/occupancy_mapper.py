@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.core.actions import HEADINGS
@@ -13,6 +12,9 @@ from avn.core.pose import turned
 from avn.mapping.base import Mapper
 from avn.mapping.occupancy_map import CERTAIN, OccupancyMap
 from avn.planning.partial_graph import GraphRules, PartialGraph
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator

@@ -13,7 +13,8 @@ from torchmetrics import MeanMetric
 from avn.core.errors import UserError
 from avn.modules.audio_network import FIVE_LAYERS, AudioNetwork, PictureBatch
 from avn.modules.network import SUBSETS, Part
-from avn.modules.stop_metrics import CRITERIA, StopScores
+from avn.modules.stop_metrics import StopScores
+from avn.modules.stop_threshold import check_decision
 
 ONE_SCORE: Part = {**FIVE_LAYERS, "output_scale": 1.0}
 
@@ -36,7 +37,7 @@ class StopClassifier(AudioNetwork):
         Share of training clips at the goal, more than 0 and less than 1.
     criterion : {"approach", "balanced"}
         Criterion that selects the threshold on the validation apartments; see
-        `avn.modules.stop_metrics.best_threshold`. The network does not depend on it.
+        `avn.modules.stop_threshold.best_threshold`. The network does not depend on it.
     threshold : float or None
         Probability at and above which the agent stops, 0 to 1; null selects it by `criterion`.
     **recipe
@@ -140,15 +141,6 @@ class StopClassifier(AudioNetwork):
             loss.reset()
             scores.reset()
             self.keep(values)
-
-
-def check_decision(criterion: str, threshold: float | None) -> None:
-    """Raise `UserError` for an unknown `criterion` or a `threshold` outside 0 to 1."""
-    if criterion not in CRITERIA:
-        known = ", ".join(CRITERIA)
-        raise UserError(f"stop_model.criterion: '{criterion}' is none of {known}")
-    if threshold is not None and not 0 <= threshold <= 1:
-        raise UserError(f"stop_model.threshold: {threshold}; give 0 to 1, or null to choose one")
 
 
 def _log_odds(probability: float) -> float:

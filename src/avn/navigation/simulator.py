@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
-from tensordict import TensorDict
 from torch import Tensor
 
 from avn.core.actions import BACKWARD, STOP
@@ -18,6 +18,9 @@ from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import advance, build_scene_batch
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
 
 # Episodes whose realisations are drawn at once, so that the 64-bit draws stay in the cache.
 _CHUNK = 256
@@ -147,6 +150,8 @@ class Simulator:
             int64, cells to the right, cells to the front and quarter turns clockwise since the
             start, in the frame of the start; and the audio and visual observations by name.
         """
+        from tensordict import TensorDict
+
         odometry = self.tables.odometry(self.start, self.state, self._origin)
         observation = {"collided": self._collided.clone(), "odometry": odometry}
         if self.tables.audio:
@@ -166,6 +171,8 @@ class Simulator:
         trajectory_index : (N,) int64
             Trajectory of each episode.
         """
+        from tensordict import TensorDict
+
         trajectories = torch.from_numpy(self.episodes.trajectories)
         observed = {
             "collided": torch.zeros(trajectories.shape, dtype=torch.bool),

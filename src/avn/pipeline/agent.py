@@ -11,7 +11,7 @@ from avn.agents.base import Agent
 from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.mapping.base import Mapper
-from avn.modules.stop_classifier import check_decision
+from avn.modules.stop_threshold import check_decision
 from avn.navigation.protocols import Protocol
 from avn.pipeline import policy, policy_data, stop_classifier
 from avn.pipeline.stage import Stage

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -23,13 +23,14 @@ from avn.core.prefetch import prefetch, threads_for_one_operation
 from avn.core.progress import progress_bar
 from avn.dataset.scene import AudibleScene, Scene
 from avn.dataset.source_locations import locate_sources
-from avn.modules.audio_network import AudioNetwork
-from avn.modules.sound_metrics import location_errors
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
 from avn.pipeline.trained_on_clips import TrainedOnClips
+
+if TYPE_CHECKING:
+    from avn.modules.audio_network import AudioNetwork
 
 # Clips rendered at once; more would leave the caches of a CPU.
 BATCH = 96
@@ -243,6 +244,8 @@ def source_estimate_errors(scene: Scene, estimates: Tensor, sounds: Sequence[str
         scene, sound, sight, clips, error_m and bearing_deg (medians), front_back (share of clips
         with a bearing error of more than 90 degrees).
     """
+    from avn.modules.sound_metrics import location_errors
+
     locations, visible = locate_sources(scene)
     metres, degrees = location_errors(estimates, locations[:, :, None, None])
     in_sight = visible[:, :, None, None].expand_as(metres)

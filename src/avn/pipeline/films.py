@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from omegaconf import DictConfig
 
@@ -12,10 +13,10 @@ from avn.core.hashing import digest
 from avn.core.progress import format_duration, log
 from avn.core.settings import leaves, plain
 from avn.pipeline import replay
-from avn.pipeline.observed import RunObservations, observed_stages, soundtrack
-from avn.pipeline.replay import Run
-from avn.pipeline.run import read_run
-from avn.reporting.film import write_film
+from avn.reporting.finished_run import read_run
+
+if TYPE_CHECKING:
+    from avn.pipeline.replay import Run
 
 FOLDER = "films"
 # Holds the fingerprint of the films of a folder.
@@ -33,6 +34,8 @@ def check(cfg: DictConfig) -> None:
 
 def read(cfg: DictConfig) -> set[str]:
     """Return the leaf keys of the config that films read in addition to their run."""
+    from avn.pipeline.observed import observed_stages
+
     if not cfg.film:
         return set()
     stages = observed_stages(cfg)
@@ -58,6 +61,8 @@ def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
     list of Path
         Files of the films.
     """
+    from avn.pipeline.replay import Run
+
     if not cfg.film:
         return []
     run = Run(folder, cfg, *read_run(folder))
@@ -91,6 +96,8 @@ def _make_missing(run: Run, paths: dict[int, Path]) -> None:
 
 def _fingerprint(cfg: DictConfig) -> str:
     """Return the fingerprint of the films' inputs besides the run itself."""
+    from avn.pipeline.observed import observed_stages
+
     stages = [stage.fingerprint for stage in observed_stages(cfg)]
     return digest(stages, plain(cfg, "microphone"))
 
@@ -102,6 +109,9 @@ def _name(run: Run, label: int) -> str:
 
 
 def _write(run: Run, paths: dict[int, Path]) -> None:
+    from avn.pipeline.observed import RunObservations, soundtrack
+    from avn.reporting.film import write_film
+
     observations = RunObservations(run)
     for trace, path in zip(replay.traces(run, list(paths)), paths.values(), strict=True):
         clips = observations.clips(trace)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import torch
-from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig
 from torch import Tensor
 
@@ -20,17 +19,19 @@ from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.progress import progress_bar
 from avn.core.settings import plain, typed
-from avn.datamodules.views import ApartmentViews, ViewData
 from avn.dataset.scene import Scene
 from avn.dataset.views import Views
-from avn.modules.local_patch_metrics import calibrated, local_patch_metrics
-from avn.modules.occupancy_cnn import OccupancyCnn
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.trained import Fitted
 from avn.pipeline.views import RenderedViews
-from avn.reporting.local_patch_figures import LocalPatchFigures
 from avn.views.local_patch_visibility import visible_cells
 from avn.views.settings import CameraConfig
+
+if TYPE_CHECKING:
+    from lightning.pytorch.callbacks import Callback
+
+    from avn.datamodules.views import ApartmentViews, ViewData
+    from avn.modules.occupancy_cnn import OccupancyCnn
 
 # Views of a batch at inference.
 BATCH = 64
@@ -91,6 +92,8 @@ class OccupancyNetwork(Fitted):
 
     def data(self) -> ViewData:
         """Return the data module of views and true local patches."""
+        from avn.datamodules.views import ViewData
+
         *train_views, validation_views = (stage.load() for stage in self._views())
         camera = typed(self.cfg.renderer.camera)
         train = zip(self.train.plans, *train_views, strict=True)
@@ -103,10 +106,14 @@ class OccupancyNetwork(Fitted):
 
     def callbacks(self) -> Sequence[Callback]:
         """Return callbacks that log figures to TensorBoard."""
+        from avn.reporting.local_patch_figures import LocalPatchFigures
+
         return (LocalPatchFigures(),)
 
     def measure(self, model: OccupancyCnn, data: ViewData) -> dict[str, Any]:
         """Return metrics over all validation views, of the network and of the prior."""
+        from avn.modules.local_patch_metrics import calibrated, local_patch_metrics
+
         views = data.measured_views["validation"]
         predictions = []
         with torch.inference_mode():
@@ -126,6 +133,8 @@ class OccupancyNetwork(Fitted):
 
 
 def _seen(plan: FloorPlan, camera: CameraConfig, views: Sequence[Views]) -> ApartmentViews:
+    from avn.datamodules.views import ApartmentViews
+
     free, visible = true_local_patches(plan, camera)
     return ApartmentViews(
         [v.rgb for v in views], [v.depth for v in views], free.numpy(), visible.numpy()
@@ -231,6 +240,8 @@ def local_patch_errors(
         Columns scene, by (`network` or `prior`), cells (`all` or `visible`), accuracy, auc, ece and
         loss; the last rows are over all scenes.
     """
+    from avn.modules.local_patch_metrics import local_patch_metrics
+
     truths = [true_local_patches(scene.plan, camera) for scene in scenes]
     free, visible = (torch.cat(tensors) for tensors in zip(*truths, strict=True))
     groups = [

@@ -20,15 +20,8 @@ from avn.pipeline.audio_inference import source_estimate_errors
 from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork, local_patch_errors
 from avn.pipeline.sounds import sound_files
-from avn.reporting import perception_tables, results
-from avn.reporting.table import wide_console
-
-HEARD, SEEN, PLACES = "source_estimates.csv", "local_patches.csv", "localisation.csv"
-TABLES = {
-    HEARD: perception_tables.source_estimates_table,
-    SEEN: perception_tables.local_patches_table,
-    PLACES: perception_tables.localisation_table,
-}
+from avn.reporting import results
+from avn.reporting.finished_run import LOCAL_PATCHES, LOCALISATION, SOURCE_ESTIMATES
 
 
 def write(
@@ -56,24 +49,17 @@ def write(
     cfg, stages = observed.cfg, observed.stages
     if "source_estimate" in stages:
         source_estimates = [one.audio["source_estimate"] for one in observations]
-        results.write_csv(_source_estimates(cfg, scenes, source_estimates), folder / HEARD)
+        results.write_csv(
+            _source_estimates(cfg, scenes, source_estimates), folder / SOURCE_ESTIMATES
+        )
     if "local_patch" in stages:
         estimates = [patches[:, 0] for patches in stages["local_patch"].load()]
         prior = OccupancyNetwork(cfg).prior()
         errors = local_patch_errors(scenes, typed(cfg.renderer.camera), estimates, prior)
-        results.write_csv(errors, folder / SEEN)
+        results.write_csv(errors, folder / LOCAL_PATCHES)
     if "visual_embedding" in stages and "top" in cfg.mapper:
         features = [one.visual["visual_embedding"] for one in observations]
-        results.write_csv(_places(cfg, scenes, walks, features), folder / PLACES)
-
-
-def show(folder: Path) -> None:
-    """Print the tables of a run's folder."""
-    console = wide_console()
-    for name, table in TABLES.items():
-        if (folder / name).is_file():
-            console.print(table(results.read_csv(folder / name)))
-            console.print()
+        results.write_csv(_places(cfg, scenes, walks, features), folder / LOCALISATION)
 
 
 def _source_estimates(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import torch
@@ -40,11 +40,12 @@ from avn.pipeline.policy_data import (
 from avn.pipeline.sound_network import has_sound_model
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.trained import METRICS, Trained
-from avn.rl.algorithm import Algorithm
-from avn.rl.exploration_memory import draw_trajectories
-from avn.rl.networks import ActorCritic, NetworkSpec
-from avn.rl.training import BEST, MONITOR, Training, load_network
-from avn.rl.worker import TrainingSpec
+
+if TYPE_CHECKING:
+    from avn.rl.algorithm import Algorithm
+
+if TYPE_CHECKING:
+    from avn.rl.networks import ActorCritic, NetworkSpec
 
 # Seed of the episodes on which an agent is evaluated during training.
 MEASURED_SEED = 0
@@ -147,6 +148,9 @@ class Policy(Trained):
         UserError
             Where a checkpoint belongs to another config, or has changed since it was trained.
         """
+        from avn.rl.networks import ActorCritic
+        from avn.rl.training import BEST, load_network
+
         network = ActorCritic(_network_spec(self.cfg, self._feature_sizes()))
         load_network(network, self.folder / BEST, self.fingerprint)
         self.check_weights()
@@ -164,6 +168,8 @@ class Policy(Trained):
 
 
 def _network_spec(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
+    from avn.rl.networks import NetworkSpec
+
     protocol: Protocol = build_object("protocol", cfg.protocol)
     return NetworkSpec(
         features=features,
@@ -177,6 +183,10 @@ def _network_spec(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
 
 def _train(policy: Policy) -> None:
     """Train a policy and write its metrics."""
+    from avn.rl.networks import ActorCritic
+    from avn.rl.training import MONITOR, Training
+    from avn.rl.worker import TrainingSpec
+
     started = time.perf_counter()
     cfg, recipe = policy.cfg, build_algorithm(policy.cfg)
     opened = {subset: load_subset(cfg, subset) for subset in SUBSETS}
@@ -218,6 +228,8 @@ def _train(policy: Policy) -> None:
 
 
 def _trajectories(cfg: DictConfig, scenes: Sequence[Scene], tables: SceneBatch) -> Tensor | None:
+    from avn.rl.exploration_memory import draw_trajectories
+
     if not cfg.baseline.memory:
         return None
     steps = cfg.protocol.exploration_steps

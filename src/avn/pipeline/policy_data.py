@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from omegaconf import DictConfig
 
@@ -19,7 +19,9 @@ from avn.pipeline.scenes import Geometry
 from avn.pipeline.sound_network import has_sound_model
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stage import Stage
-from avn.rl.networks import ActorCritic
+
+if TYPE_CHECKING:
+    from avn.rl.networks import ActorCritic
 
 SUBSETS = ("train", "validation")
 

@@ -20,8 +20,9 @@ from avn.core.errors import UserError
 from avn.core.settings import plain
 from avn.dataset.scene import Scene
 from avn.navigation.trace import Trace
-from avn.pipeline.run import Evaluation, read_run, rollout_scenes
+from avn.pipeline.run import Evaluation, rollout_scenes
 from avn.pipeline.stage import MACHINE, build
+from avn.reporting.finished_run import read_run
 
 # Settings that name a run where it differs in them from the others.
 _TELLING = ("protocol", "acoustics", "look", "localisation", "exploration", "seed", "train_seed")

@@ -15,10 +15,11 @@ from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest
 from avn.core.progress import format_duration, log
 from avn.pipeline.dashboard import Dashboard
-from avn.pipeline.run import RESULTS, Evaluation, agent_label, read_run
+from avn.pipeline.run import Evaluation, agent_label
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stage import discard_if_forced, make, missing, missing_error, timings
 from avn.reporting import published, results, table
+from avn.reporting.finished_run import RESULTS, read_run
 from avn.reporting.table import PAPER_PROTOCOL
 
 # Files beside `results.csv`.

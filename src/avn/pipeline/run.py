@@ -8,7 +8,6 @@ from typing import Any
 
 import pandas as pd
 from omegaconf import DictConfig, OmegaConf
-from torch.utils.tensorboard import SummaryWriter
 
 from avn.agents.rollout import Labels, Watch, rollout_scene
 from avn.apartments.splits import PARTS
@@ -35,9 +34,9 @@ from avn.pipeline.policy import learns
 from avn.pipeline.scenes import Geometry
 from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
 from avn.pipeline.stage import Stage
-from avn.reporting import results, table
+from avn.reporting import results
+from avn.reporting.finished_run import EPISODE_RECORDS, RESULTS
 
-RESULTS, EPISODE_RECORDS = "results.csv", "episodes.csv"
 EPISODES = ("frozen", "exhaustive")
 
 
@@ -239,33 +238,10 @@ def episodes_of(cfg: DictConfig, scene: Scene, protocol: Protocol) -> Episodes:
     return frozen_episodes(scene, sounds, protocol, cfg.seed, cfg.exploration)
 
 
-def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Read results and episodes of a finished run.
-
-    Raises
-    ------
-    UserError
-        Where a file is missing or damaged, or the results do not match the episodes.
-    """
-    try:
-        runs = results.read_csv(folder / RESULTS)
-        episodes = results.read_csv(folder / EPISODE_RECORDS)
-        pd.testing.assert_frame_equal(runs, results.summarise(episodes))
-    except (OSError, ValueError, KeyError, AssertionError, UserError) as error:
-        raise UserError(f"{folder}: the run is damaged; delete the folder and run again") from error
-    return runs, episodes
-
-
-def show_run(cfg: DictConfig, folder: Path) -> None:
-    """Print the results of a run by scene and sound, and by difficulty of the episodes."""
-    privileged = [agent_label(cfg)] if cfg.agent.privileged else []
-    runs, episodes = read_run(folder)
-    table.print_tables(runs, episodes, privileged=privileged)
-    perception_tables.show(folder)
-
-
 def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
     """Write TensorBoard scalars by scene and sound, and hparams with SR and SPL."""
+    from torch.utils.tensorboard import SummaryWriter
+
     settings = {key: cfg[key].name for key in ("agent", "protocol", "acoustics", "split")}
     settings |= {key: cfg[key].name for key in ("sound_model", "mapper", "planner")}
     settings |= {"seed": cfg.seed, "train_seed": cfg.train_seed, "episodes": cfg.episodes}

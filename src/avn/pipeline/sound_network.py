@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import torch
-from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig
 
 from avn.core.classes import build_object
-from avn.datamodules.sound import SoundData
-from avn.modules.sound_cnn import SoundCnn
 from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.trained_on_clips import TrainedOnClips
-from avn.reporting.sound_figures import SoundFigures
+
+if TYPE_CHECKING:
+    from lightning.pytorch.callbacks import Callback
+
+    from avn.datamodules.sound import SoundData
+    from avn.modules.sound_cnn import SoundCnn
 
 
 def has_sound_model(cfg: DictConfig) -> bool:
@@ -42,10 +45,14 @@ class SoundNetwork(TrainedOnClips):
 
     def data(self) -> SoundData:
         """Return the data module of clips and source locations."""
+        from avn.datamodules.sound import SoundData
+
         return SoundData(**self.clips())
 
     def callbacks(self) -> Sequence[Callback]:
         """Return callbacks that log figures to TensorBoard."""
+        from avn.reporting.sound_figures import SoundFigures
+
         return (SoundFigures(),)
 
 

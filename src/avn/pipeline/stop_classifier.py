@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
-from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig
 
 from avn.core.classes import build_object
 from avn.core.progress import progress_bar
-from avn.datamodules.stop import StopData
-from avn.modules.stop_classifier import StopClassifier, check_decision
-from avn.modules.stop_metrics import CRITERIA, StopScores, best_threshold
+from avn.modules.stop_threshold import CRITERIA, best_threshold, check_decision
 from avn.navigation.protocols import Protocol
 from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.trained_on_clips import TrainedOnClips
-from avn.reporting.stop_figures import StopFigures
+
+if TYPE_CHECKING:
+    from lightning.pytorch.callbacks import Callback
+
+    from avn.datamodules.stop import StopData
+    from avn.modules.stop_classifier import StopClassifier
 
 # Keys of the decision, which the network does not depend on.
 DECISION = ("stop_model.criterion", "stop_model.threshold")
@@ -61,6 +63,8 @@ class StopNetwork(TrainedOnClips):
 
     def data(self) -> StopData:
         """Return the data module of clips and moves to the goal."""
+        from avn.datamodules.stop import StopData
+
         protocol: Protocol = build_object("protocol", self.cfg.protocol)
         return StopData(
             **self.clips(), goal=lambda scene: protocol.goal_cells(scene.grid, scene.sources)
@@ -68,10 +72,14 @@ class StopNetwork(TrainedOnClips):
 
     def callbacks(self) -> Sequence[Callback]:
         """Return callbacks that log figures to TensorBoard."""
+        from avn.reporting.stop_figures import StopFigures
+
         return (StopFigures(),)
 
     def measure(self, model: StopClassifier, data: StopData) -> dict[str, Any]:
         """Return thresholds and error rates over one realisation of every validation clip."""
+        from avn.modules.stop_metrics import StopScores
+
         clips = data.measured_clips["validation"]
         scores, what = StopScores(data.sounds.names), "choosing a threshold"
         with torch.inference_mode(), progress_bar(what, len(clips), "clips") as done:

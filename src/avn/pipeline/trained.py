@@ -6,19 +6,20 @@ import json
 from abc import abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
-
-import lightning as L
-from lightning.pytorch.callbacks import Callback
+from typing import TYPE_CHECKING, Any
 
 from avn.core.errors import UserError
 from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import file_hash
-from avn.modules import training
-from avn.modules.network import Network
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.stage import Stage
 from avn.reporting.model_card import write_card
+
+if TYPE_CHECKING:
+    import lightning as L
+    from lightning.pytorch.callbacks import Callback
+
+    from avn.modules.network import Network
 
 METRICS, CHECKSUM = "metrics.json", "best.ckpt sha256"
 
@@ -66,6 +67,8 @@ class Trained(Stage):
 
     def finish(self, metrics: dict[str, Any], recipe: dict[str, Any]) -> None:
         """Write `metrics.json` and the model card, which mark the training as finished."""
+        from avn.modules import training
+
         metrics = metrics | {CHECKSUM: file_hash(self.folder / training.BEST)}
         with atomic_write(self.folder / METRICS) as part:
             part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
@@ -73,6 +76,8 @@ class Trained(Stage):
 
     def check_weights(self) -> None:
         """Raise `UserError` where the best checkpoint has changed since the training."""
+        from avn.modules import training
+
         best = self.folder / training.BEST
         if self.metrics().get(CHECKSUM) != file_hash(best):
             raise UserError(
@@ -114,6 +119,8 @@ class Fitted(Trained):
 
     def make(self) -> None:
         """Train the network, or resume an interrupted training."""
+        from avn.modules import training
+
         model = self.untrained()
         data = self.data()
         metrics = training.fit(data, model, self.folder, self.callbacks())
@@ -127,6 +134,8 @@ class Fitted(Trained):
         UserError
             Where a checkpoint belongs to another config, or has changed since it was trained.
         """
+        from avn.modules import training
+
         model = self.untrained()
         training.load_weights(model, self.folder / training.BEST)
         self.check_weights()

@@ -7,10 +7,9 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
-from torch.utils.tensorboard import SummaryWriter
 
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
@@ -19,6 +18,9 @@ from avn.rl.networks import ActorCritic
 from avn.rl.shared import SharedState, flatten_parameters
 from avn.rl.worker import TrainingSpec
 from avn.rl.worker_pool import start_pool
+
+if TYPE_CHECKING:
+    from torch.utils.tensorboard import SummaryWriter
 
 LAST, BEST, CURVE = "last.ckpt", "best.ckpt", "curve.json"
 # Validation metric that selects the best network.
@@ -89,6 +91,8 @@ class Training:
         UserError
             If a worker dies.
         """
+        from torch.utils.tensorboard import SummaryWriter
+
         recipe = self.spec.recipe
         updates = max(1, recipe.total_steps // (recipe.batch * recipe.workers))
         planned = max(1, round(recipe.total_steps / recipe.validate_every))

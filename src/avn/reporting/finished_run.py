@@ -1,0 +1,58 @@
+"""Files of a finished run: reading its records, and printing its tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from avn.core.errors import UserError
+from avn.reporting import perception_tables, results, table
+
+RESULTS, EPISODE_RECORDS = "results.csv", "episodes.csv"
+SOURCE_ESTIMATES, LOCAL_PATCHES, LOCALISATION = (
+    "source_estimates.csv",
+    "local_patches.csv",
+    "localisation.csv",
+)
+_PERCEPTION = {
+    SOURCE_ESTIMATES: perception_tables.source_estimates_table,
+    LOCAL_PATCHES: perception_tables.local_patches_table,
+    LOCALISATION: perception_tables.localisation_table,
+}
+
+
+def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Read results and episodes of a finished run.
+
+    Raises
+    ------
+    UserError
+        Where a file is missing or damaged, or the results do not match the episodes.
+    """
+    try:
+        runs = results.read_csv(folder / RESULTS)
+        episodes = results.read_csv(folder / EPISODE_RECORDS)
+        pd.testing.assert_frame_equal(runs, results.summarise(episodes))
+    except (OSError, ValueError, KeyError, AssertionError, UserError) as error:
+        raise UserError(f"{folder}: the run is damaged; delete the folder and run again") from error
+    return runs, episodes
+
+
+def show_run(folder: Path, privileged: bool = False) -> None:
+    """Print the results of a run by scene and sound, by difficulty, and of its perception.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    privileged : bool
+        Whether its agent has access to ground truth.
+    """
+    runs, episodes = read_run(folder)
+    table.print_tables(runs, episodes, privileged=list(set(runs["agent"])) if privileged else [])
+    console = table.wide_console()
+    for name, tabulate in _PERCEPTION.items():
+        if (folder / name).is_file():
+            console.print(tabulate(results.read_csv(folder / name)))
+            console.print()
