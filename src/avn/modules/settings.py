@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+# Files of the best and of the last epoch in the folder of a training.
+BEST, LAST = "best.ckpt", "last.ckpt"
+
 
 @dataclass
 class OptimizerConfig:

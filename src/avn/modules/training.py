@@ -18,8 +18,8 @@ from avn.core.errors import UserError
 from avn.core.prefetch import threads_for_one_operation
 from avn.core.progress import progress_bar
 from avn.modules.network import Network
+from avn.modules.settings import BEST, LAST
 
-BEST, LAST = "best.ckpt", "last.ckpt"
 Trained = TypeVar("Trained", bound=Network)
 
 

@@ -37,7 +37,8 @@ def model_of(cfg: DictConfig) -> Trained:
     if cfg.model.name not in MODELS:
         raise UserError(f"model.name: '{cfg.model.name}' is none of {', '.join(MODELS)}")
     stage = MODELS[cfg.model.name][0](cfg)
-    stage.check()
+    if not stage.done():
+        stage.check()
     return stage
 
 
@@ -55,7 +56,7 @@ def train_model(stage: Trained) -> dict[str, float]:
         Where an input is missing and `auto` is false, or the model is damaged.
     """
     build(stage, explicit=True)
-    stage.load()  # refuses a damaged checkpoint
+    stage.check_weights()
     metrics, prefixes = stage.metrics(), MODELS[stage.cfg.model.name][1]
     by_sound = sound_files(stage.cfg, TRAINING)
     return {

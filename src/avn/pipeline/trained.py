@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from avn.core.errors import UserError
 from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import file_hash
+from avn.modules.settings import BEST
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.stage import Stage
 from avn.reporting.model_card import write_card
@@ -67,18 +68,14 @@ class Trained(Stage):
 
     def finish(self, metrics: dict[str, Any], recipe: dict[str, Any]) -> None:
         """Write `metrics.json` and the model card, which mark the training as finished."""
-        from avn.modules import training
-
-        metrics = metrics | {CHECKSUM: file_hash(self.folder / training.BEST)}
+        metrics = metrics | {CHECKSUM: file_hash(self.folder / BEST)}
         with atomic_write(self.folder / METRICS) as part:
             part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
         write_card(self.folder, self.title, self._setting(), recipe, metrics)
 
     def check_weights(self) -> None:
         """Raise `UserError` where the best checkpoint has changed since the training."""
-        from avn.modules import training
-
-        best = self.folder / training.BEST
+        best = self.folder / BEST
         if self.metrics().get(CHECKSUM) != file_hash(best):
             raise UserError(
                 f"{best}: changed since it was trained; delete {self.folder} to train again"
@@ -137,6 +134,6 @@ class Fitted(Trained):
         from avn.modules import training
 
         model = self.untrained()
-        training.load_weights(model, self.folder / training.BEST)
+        training.load_weights(model, self.folder / BEST)
         self.check_weights()
         return model
