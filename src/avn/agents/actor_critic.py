@@ -15,10 +15,9 @@ from avn.mapping.spatial_memory import SpatialMemory, distinct, locate
 from avn.navigation.protocols import Protocol
 
 if TYPE_CHECKING:
-    from avn.rl.networks import ActorCritic
-
-if TYPE_CHECKING:
     from tensordict import TensorDict
+
+    from avn.rl.networks import ActorCritic
 
 
 class ActorCriticAgent(Agent):

@@ -13,7 +13,6 @@ from avn.navigation.protocols import Protocol
 if TYPE_CHECKING:
     from tensordict import TensorDict
 
-if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator
 
 

@@ -24,7 +24,6 @@ from avn.planning.source_belief import SourceBelief
 if TYPE_CHECKING:
     from tensordict import TensorDict
 
-if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator
 
 LOOKS = ("once", "around")

@@ -13,7 +13,6 @@ from avn.planning.partial_graph import GraphRules, PartialGraph
 if TYPE_CHECKING:
     from tensordict import TensorDict
 
-if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator
 
 

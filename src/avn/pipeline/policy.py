@@ -43,8 +43,6 @@ from avn.pipeline.trained import METRICS, Trained
 
 if TYPE_CHECKING:
     from avn.rl.algorithm import Algorithm
-
-if TYPE_CHECKING:
     from avn.rl.networks import ActorCritic, NetworkSpec
 
 # Seed of the episodes on which an agent is evaluated during training.
