@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 
 from hydra import compose
 from hydra.core.hydra_config import HydraConfig
@@ -18,7 +18,9 @@ from avn.core.settings import leaves, plain
 _CHOOSE = ("agent", "model", "experiment")
 
 
-def refuse_unread(command: str, cfg: DictConfig, read: Collection[str]) -> None:
+def refuse_unread(
+    command: str, cfg: DictConfig, read: Collection[str], given: Sequence[str] | None = None
+) -> None:
     """Refuse overrides that change settings which the command does not read.
 
     Parameters
@@ -29,16 +31,18 @@ def refuse_unread(command: str, cfg: DictConfig, read: Collection[str]) -> None:
         Composed config.
     read : collection of str
         Dotted keys of the leaves that the command reads.
+    given : sequence of str, optional
+        Overrides; those of the command line by default.
 
     Raises
     ------
     UserError
         For such an override; the message lists the settings that are read.
     """
-    for setting in spare.settings():
+    for setting in spare.settings() if given is None else ():
         if (key := setting.split("=")[0]) not in read:
             raise _unread(key, cfg, read)
-    given = list(HydraConfig.get().overrides.task)
+    given = list(HydraConfig.get().overrides.task) if given is None else list(given)
     suspects = [
         override
         for override in OverridesParser.create().parse_overrides(given)
