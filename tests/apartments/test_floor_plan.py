@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from avn.apartments.floor_plan import FloorPlan, Piece, load
+from avn.apartments.floor_plan import FloorPlan, Piece
+from avn.apartments.floor_plan_file import load
 from avn.apartments.generator import generate
 from avn.core.errors import UserError
 
@@ -42,14 +43,14 @@ def change(data: dict[str, Any], part: str, key: str, value: object) -> None:
     ("part", "key", "value", "message"),
     [
         ("rooms", "kind", "hall", "room kind 'hall' is none of kitchen"),
-        ("rooms", "x0", 0.3, "are not on the 0.5 m lattice"),
-        ("furniture", "width", -1.0, "has no size"),
+        ("rooms", "x0", 0.3, "walls are on the 0.5 m lattice"),
+        ("furniture", "width", -1.0, "'width' is -1; give at least 0.01 m"),
         ("furniture", "x", 1e9, "'x' is 1000000000.0"),
-        ("rooms", "x0", "west", "'x0' is 'west', which is no float"),
+        ("rooms", "x0", "west", "'x0' is 'west'; give a number"),
         ("rooms", "colour", "red", "unknown key 'colour'"),
         ("doorways", "along", "z", "'along' is 'z', not 'x' or 'y'"),
         ("doorways", "x", 1.21, "is not centred on the 0.5 m lattice"),
-        ("furniture", "heading", 4, "is 4, not 0 to 3"),
+        ("furniture", "heading", 4, "'heading' is 4; give 0 north"),
     ],
 )
 def test_mistakes_are_named(

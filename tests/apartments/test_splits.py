@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
 import pytest
 import yaml
 
-from avn.apartments.floor_plan import FloorPlan
+from avn.apartments.floor_plan import FloorPlan, from_dict
+from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
 from avn.apartments.settings import SplitConfig
-from avn.apartments.splits import FROZEN, load_split
-from avn.apartments.symmetry import layout_key
+from avn.apartments.splits import FROZEN, PARTS, load_split, part_of_layout
+from avn.apartments.symmetry import Key, layout_key
 from avn.core.errors import UserError
+from avn.core.random import derive
 
 CONF = Path(__file__).parents[2] / "conf" / "split"
 SOUNDS = 3
@@ -68,7 +72,7 @@ def test_mini_is_small() -> None:
 
 
 def test_procedural_has_no_copies() -> None:
-    cfg = config("procedural")
+    cfg = replace(config("procedural"), train=3, validation=2, test=2)
     split = load_split(cfg)
     assert [len(plans) for plans in split.values()] == [cfg.train, cfg.validation, cfg.test]
     plans = list(chain(*split.values()))
@@ -77,20 +81,48 @@ def test_procedural_has_no_copies() -> None:
     assert {len(plan.sources) for plan in split["test"]} == {cfg.sources}
 
 
+def generated(train: int, validation: int, test: int, **more: int) -> dict[str, list[FloorPlan]]:
+    numbers = {"train": train, "validation": validation, "test": test}
+    return load_split(SplitConfig(**{"name": "own", "size": "small", **numbers, **more}))  # type: ignore[arg-type]
+
+
+def test_the_number_of_apartments_of_a_part_changes_no_other_apartment() -> None:
+    few, many = generated(1, 2, 1), generated(4, 1, 2)
+    for part in PARTS:
+        shared = list(zip(few[part], many[part], strict=False))
+        assert shared
+        assert all(one.to_json() == other.to_json() for one, other in shared)
+
+
+def test_a_layout_belongs_to_one_part_whatever_the_seed() -> None:
+    layouts: dict[str, set[Key]] = {part: set() for part in PARTS}
+    for seed in range(3):
+        for part, plans in generated(2, 2, 2, seed=seed).items():
+            layouts[part] |= {layout_key(plan) for plan in plans}
+            assert {part_of_layout(layout_key(plan)) for plan in plans} == {part}
+    assert len(set.union(*layouts.values())) == sum(map(len, layouts.values())) > 15
+
+
+def test_seeds_draw_other_apartments() -> None:
+    texts = [plan.to_json() for s in (0, 1) for plan in chain(*generated(2, 2, 2, seed=s).values())]
+    assert len(set(texts)) == len(texts) == 12
+
+
+def test_the_part_of_a_layout_is_that_of_its_mirror_image_and_of_its_file() -> None:
+    plan = generate(5, "home")
+    rooms = tuple(replace(r, x0=-r.x1, x1=-r.x0) for r in plan.rooms)
+    doorways = tuple(replace(d, x=-d.x) for d in plan.doorways)
+    mirrored = replace(plan, rooms=rooms, doorways=doorways)
+    for other in (mirrored, from_dict(json.loads(plan.to_json()))):
+        assert part_of_layout(layout_key(other)) == part_of_layout(layout_key(plan))
+
+
 def test_a_layout_that_comes_again_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    from avn.apartments import splits
+    def one_seed(*names: object) -> int:
+        return 7 if names[0] == "apartment" else derive(*names)
 
-    drawn = []
-
-    def every_seed_twice(seed: int, name: str, sources: int, size: str) -> FloorPlan:
-        drawn.append(seed)
-        return generate(seed // 2, name, sources, size)
-
-    generate = splits.generate
-    monkeypatch.setattr(splits, "generate", every_seed_twice)
-    cfg = SplitConfig("procedural", None, 0, "small", 1, 1, 1, 2, 2)
-    plans = list(chain(*load_split(cfg).values()))
-    assert drawn == [0, 1, 2, 3, 4]
+    monkeypatch.setattr("avn.apartments.splits.derive", one_seed)
+    plans = generated(3, 1, 1)["train"]
     assert len({layout_key(plan) for plan in plans}) == 3
 
 
@@ -102,7 +134,8 @@ def test_a_layout_that_comes_again_is_passed_over(monkeypatch: pytest.MonkeyPatc
         ({"sources": 0}, r"split\.sources is 0; give at least 1"),
         ({"seed": -1}, r"split\.seed is -1; give 0 or more"),
         ({"size": "huge"}, r"split\.size is 'huge'; choose one of small"),
-        ({"folder": "nowhere"}, r"split\.folder: there is no folder nowhere"),
+        ({"folder": "nowhere"}, r"split\.folder: nowhere does not exist; give a folder"),
+        ({"folder": __file__}, r"split\.folder: .*test_splits\.py is a file; give a folder"),
     ],
 )
 def test_bad_values_are_named(change: dict[str, object], message: str) -> None:
@@ -149,3 +182,36 @@ def test_a_file_under_another_name_is_refused(tmp_path: Path) -> None:
     (folder / "room_2.json").rename(folder / "room_9.json")
     with pytest.raises(UserError, match=r"room_9\.json: the plan is named 'room_2'"):
         load_split(SplitConfig(folder=str(folder)))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("training_1.json", "not clear whether it is a test apartment; name it train_"),
+        ("Validation_1.json", "not clear whether it is a test apartment"),
+        ("train1.json", "not clear whether it is a test apartment"),
+        ("val.json", None),
+        ("valley_1.json", None),
+        ("trainer.json", None),
+        ("room_9.yaml", r"not read; floor plans are files \*\.json"),
+        ("notes.txt", None),
+        (".room_9.json", None),
+    ],
+)
+def test_a_file_that_may_be_meant_otherwise_is_refused(
+    tmp_path: Path, name: str, message: str | None
+) -> None:
+    folder = copy_of_var(tmp_path)
+    data = json.loads((folder / "room_1.json").read_text())
+    (folder / name).write_text(json.dumps({**data, "name": Path(name).stem}))
+    if message is None:
+        assert sum(map(len, load_split(SplitConfig(folder=str(folder))).values())) >= 10
+        return
+    with pytest.raises(UserError, match=rf"{name}: {message}"):
+        load_split(SplitConfig(folder=str(folder)))
+
+
+def test_a_folder_without_floor_plans_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("none yet")
+    with pytest.raises(UserError, match=r"split\.folder: no floor plan in .*; add one"):
+        load_split(SplitConfig(folder=str(tmp_path)))

@@ -114,7 +114,7 @@ def test_how_an_agent_acts_is_no_part_of_what_it_learnt(override, wanted):
         ("acoustics=diffraction", {*DIRECT, "run_windows", "policy_map"}),
         ("acoustics.rays=500", {*SOUNDING, "run_windows", "policy_map"}),
         ("acoustics.receiver_height=1.4", {*SOUNDING, "geometry", "run_windows", "policy_map"}),
-        ("split.seed=9", EVERY),
+        ("split.folder=var", EVERY),
     ],
 )
 def test_a_setting_makes_anew_what_it_changes(override, wanted):
@@ -255,7 +255,7 @@ def test_two_rows_never_share_a_folder():
 @pytest.mark.parametrize("kind", [SoundNetwork, StopNetwork])
 def test_the_acoustics_of_the_training_world_are_read_where_they_follow_the_test(kind):
     read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini")).read()
-    assert {"acoustics.name", "acoustics.direct_path", "acoustics.rays", "split.seed"} <= read
+    assert {"acoustics.name", "acoustics.direct_path", "acoustics.rays", "split.folder"} <= read
     own = "+acoustics@training.acoustics=resonance"
     read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini", own)).read()
     assert not any(key.startswith("acoustics.") for key in read)

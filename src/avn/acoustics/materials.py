@@ -26,6 +26,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from avn.apartments.floor_plan import MATERIALS
 from avn.core.errors import UserError
 
 BANDS = (125, 250, 500, 1000, 2000, 4000)
@@ -72,7 +73,7 @@ _ROUGHNESS: dict[str, float | tuple[float, ...]] = {
     "fabric": 0.30,
 }
 
-NAMES = tuple(_ABSORPTION)
+NAMES = MATERIALS
 
 
 def _spread(roughness: float | tuple[float, ...]) -> tuple[float, ...]:

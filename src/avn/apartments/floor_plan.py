@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
+import reprlib
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from avn.core.errors import UserError
@@ -22,6 +22,54 @@ DOOR_WIDTH = 0.9
 DOOR_HEIGHT = 2.05
 CEILING = 2.6
 ROOM_KINDS = ("kitchen", "bedroom", "living_room", "bathroom")
+FURNITURE_KINDS = (
+    "armchair",
+    "basin",
+    "bath_cabinet",
+    "bathtub",
+    "bed",
+    "bookshelf",
+    "chair",
+    "coffee_table",
+    "counter",
+    "cupboard",
+    "desk",
+    "dining_table",
+    "dresser",
+    "fridge",
+    "front_door",
+    "nightstand",
+    "plant",
+    "shower",
+    "sideboard",
+    "sink",
+    "sofa",
+    "stove",
+    "television",
+    "toilet",
+    "tv_stand",
+    "wardrobe",
+    "washing_machine",
+)
+# Their acoustic coefficients are in `avn.acoustics.materials`.
+MATERIALS = (
+    "parquet",
+    "carpet",
+    "floor_tiles",
+    "plaster",
+    "painted_brick",
+    "wall_tiles",
+    "ceiling_plaster",
+    "glass",
+    "wood",
+    "upholstery",
+    "mattress",
+    "laminate",
+    "ceramic",
+    "metal",
+    "books",
+    "fabric",
+)
 FORMAT_VERSION = 1
 FARTHEST = 1000.0  # metres
 
@@ -134,10 +182,13 @@ _PARTS = {
     "furniture": Piece,
     "lamps": Lamp,
 }
+_SEE = "(docs/apartments.md lists all keys)"
 
 
-def from_dict(data: dict[str, Any], origin: str = "floor plan") -> FloorPlan:
+def from_dict(data: Any, origin: str = "floor plan") -> FloorPlan:
     """Build a plan from the result of `FloorPlan.to_dict`.
+
+    Keys and types are checked; `floor_plan_checks.check` tests whether the plan can be built.
 
     Parameters
     ----------
@@ -149,28 +200,25 @@ def from_dict(data: dict[str, Any], origin: str = "floor plan") -> FloorPlan:
     Raises
     ------
     UserError
-        If a key is missing, unknown or of another type, or the plan is not valid.
+        If a key is missing, unknown or of another type.
     """
     if not isinstance(data, dict) or data.get("format") != FORMAT_VERSION:
         raise UserError(
             f"{origin}: not a floor plan of format {FORMAT_VERSION}, the one of this version; "
-            "see docs/dataset.md"
+            f"write an object with the key 'format': {FORMAT_VERSION} {_SEE}"
         )
     known = ("format", "name", "sources", *_PARTS)
-    for key in known:
-        if key not in data:
-            raise UserError(f"{origin}: key '{key}' is missing; see docs/dataset.md")
-    for key in data:
-        if key not in known:
-            raise UserError(f"{origin}: unknown key '{key}'; there are {', '.join(known)}")
+    _check_keys(data, known, known, origin)
+    if not isinstance(data["name"], str):
+        raise UserError(f"{origin}: 'name' is {_short(data['name'])}; give text in quotes")
     for key in (*_PARTS, "sources"):
         if not isinstance(data[key], list | tuple):
-            raise UserError(f"{origin}: '{key}' is no list; see docs/dataset.md")
-    for point in data["sources"]:
+            raise UserError(f"{origin}: '{key}' is {_short(data[key])}; give a list {_SEE}")
+    for n, point in enumerate(data["sources"]):
         if not isinstance(point, list | tuple) or [_number(v) for v in point] != [True, True]:
-            raise UserError(f"{origin}: a source is {point!r}, not [x, y] in metres")
-    plan = FloorPlan(
-        name=str(data["name"]),
+            raise UserError(f"{origin}: sources[{n}] is {_short(point)}; give [x, y] in metres")
+    return FloorPlan(
+        name=data["name"],
         sources=tuple((float(x), float(y)) for x, y in data["sources"]),
         **{
             key: tuple(
@@ -179,19 +227,6 @@ def from_dict(data: dict[str, Any], origin: str = "floor plan") -> FloorPlan:
             for key, cls in _PARTS.items()
         },
     )
-    _check(plan, origin)
-    return plan
-
-
-def load(path: Path) -> FloorPlan:
-    """Read a plan from a JSON file; raise `UserError` with the file's name for a bad one."""
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; give the path of a floor plan") from error
-    except ValueError as error:
-        raise UserError(f"{path}: not JSON ({error}); give the path of a floor plan") from error
-    return from_dict(data, str(path))
 
 
 def _part(cls: type, data: Any, where: str) -> Any:
@@ -203,72 +238,45 @@ def _part(cls: type, data: Any, where: str) -> Any:
         If a key is missing, unknown or of another type; the message names the part and the key.
     """
     if not isinstance(data, dict):
-        raise UserError(f"{where}: is {data!r}, not an object with keys; see docs/dataset.md")
+        raise UserError(f"{where}: is {_short(data)}; give an object with keys {_SEE}")
     fields = {field.name: field for field in dataclasses.fields(cls)}
-    for key in data:
-        if key not in fields:
-            raise UserError(f"{where}: unknown key '{key}'; there are {', '.join(fields)}")
-    for key, field in fields.items():
-        if key not in data:
-            if field.default is dataclasses.MISSING:
-                raise UserError(f"{where}: key '{key}' is missing; see docs/dataset.md")
-            continue
-        if field.type == "str":
-            fits = isinstance(data[key], str)
+    needed = [key for key, field in fields.items() if field.default is dataclasses.MISSING]
+    _check_keys(data, needed, fields, where)
+    values = dict(data)
+    for key, value in data.items():
+        kind = str(fields[key].type)
+        if kind == "str":
+            fits, wanted = isinstance(value, str), "text in quotes"
         else:
-            fits = _number(data[key]) and (field.type != "int" or int(data[key]) == data[key])
+            fits, wanted = _number(value), f"a number from -{FARTHEST:g} to {FARTHEST:g}"
+        if kind == "int":
+            fits, wanted = fits and int(value) == value, "a whole number"
         if not fits:
-            raise UserError(f"{where}: '{key}' is {data[key]!r}, which is no {field.type}")
-    return cls(**data)
+            raise UserError(f"{where}: '{key}' is {_short(value)}; give {wanted}")
+        values[key] = int(value) if kind == "int" else value
+    return cls(**values)
+
+
+def _check_keys(
+    data: dict[str, Any], needed: Iterable[str], known: Iterable[str], where: str
+) -> None:
+    """Raise `UserError` for the first key that is missing or unknown."""
+    for key in data:
+        if key not in known:
+            raise UserError(
+                f"{where}: unknown key {_short(key)}; delete it, the keys are {', '.join(known)}"
+            )
+    for key in needed:
+        if key not in data:
+            raise UserError(f"{where}: key '{key}' is missing; add it {_SEE}")
 
 
 def _number(value: Any) -> bool:
     """Return True for a finite number of at most `FARTHEST` metres."""
-    return (
-        isinstance(value, int | float)
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-        and abs(value) <= FARTHEST
-    )
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and abs(value) <= FARTHEST  # NaN is not
 
 
-def _check(plan: FloorPlan, origin: str) -> None:
-    """Raise `UserError` if rooms, openings, furniture or sources are not valid."""
-
-    def on_lattice(*values: float) -> bool:
-        return all(math.isclose(v / CELL, round(v / CELL), abs_tol=1e-6) for v in values)
-
-    if not plan.rooms or not plan.sources:
-        missing = "sources" if plan.rooms else "rooms"
-        raise UserError(f"{origin}: {missing} is empty; a floor plan has at least one")
-    for room in plan.rooms:
-        if room.kind not in ROOM_KINDS:
-            raise UserError(f"{origin}: room kind '{room.kind}' is none of {', '.join(ROOM_KINDS)}")
-        if not on_lattice(room.x0, room.y0, room.x1, room.y1):
-            raise UserError(f"{origin}: walls of the {room.kind} are not on the {CELL} m lattice")
-        if room.x1 <= room.x0 or room.y1 <= room.y0:
-            raise UserError(f"{origin}: the {room.kind} has no area; x0 < x1 and y0 < y1 must hold")
-    openings: list[Doorway | Window] = [*plan.doorways, *plan.windows]
-    for opening in openings:
-        if opening.along not in ("x", "y"):
-            raise UserError(f"{origin}: 'along' is '{opening.along}', not 'x' or 'y'")
-    for door in plan.doorways:
-        if not on_lattice(door.x, door.y):
-            raise UserError(
-                f"{origin}: the doorway at ({door.x}, {door.y}) is not centred on the {CELL} m "
-                "lattice; move it"
-            )
-    for window in plan.windows:
-        if min(window.width, window.height) <= 0 or not 0 <= window.sill < CEILING:
-            raise UserError(
-                f"{origin}: the window at ({window.x}, {window.y}) does not fit under the ceiling"
-            )
-    for piece in plan.furniture:
-        if piece.heading not in (0, 1, 2, 3):
-            raise UserError(f"{origin}: heading of a {piece.kind} is {piece.heading}, not 0 to 3")
-        if min(piece.width, piece.depth, piece.height) <= 0 or piece.z < 0:
-            raise UserError(
-                f"{origin}: a {piece.kind} has no size; width, depth, height are over 0"
-            )
-    if len(set(plan.sources)) < len(plan.sources):
-        raise UserError(f"{origin}: two sources stand in one place; move one")
+def _short(value: Any) -> str:
+    """Return the representation of a value on one line, without the middle of a long one."""
+    return " ".join(reprlib.repr(value).split())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,24 +48,33 @@ SIZES = {
 }
 
 
-def generate(seed: int, name: str, sources: int = 5, size: str = "mixed") -> FloorPlan:
+def generate(
+    seed: int,
+    name: str,
+    sources: int = 5,
+    size: str = "mixed",
+    accepts: Callable[[FloorPlan], bool] | None = None,
+) -> FloorPlan:
     """Draw an apartment.
 
     Parameters
     ----------
     seed : int
-        The same seed, size and number of sources give the same apartment.
+        The same seed, size, number of sources and accepted layouts give the same apartment.
     name : str
         Name of the apartment.
     sources : int
         Number of source positions, spread over the rooms.
     size : str
         A key of `SIZES`.
+    accepts : callable, optional
+        Test of a layout: a plan without furniture. Layouts that it rejects are drawn again.
 
     Raises
     ------
     UserError
-        If the size is unknown, or `sources` is below 1 or more than the apartment has room for.
+        If the size is unknown, no layout is accepted, or `sources` is below 1 or more than the
+        apartment has room for.
     """
     if size not in SIZES:
         raise UserError(f"split.size is '{size}'; choose one of {', '.join(SIZES)}")
@@ -76,10 +86,15 @@ def generate(seed: int, name: str, sources: int = 5, size: str = "mixed") -> Flo
     richness = float(rng.uniform(*SIZES[size].richness))
     for _ in range(_DRAWS):
         plan = draw_layout(name, count, (fewest, most), rng)
-        plan = _furnish(plan, richness, rng) if plan is not None else None
+        if plan is None or (accepts is not None and not accepts(plan)):
+            continue
+        plan = _furnish(plan, richness, rng)
         if plan is not None:
             return _with_sources(plan, sources, rng)
-    raise UserError(f"apartment {name}: no home found for seed {seed}; take another seed")
+    raise UserError(
+        f"split: no new layout of size {size} found for apartment {name}; take another "
+        "split.seed, or ask for fewer apartments"
+    )
 
 
 def _furnish(plan: FloorPlan, richness: float, rng: np.random.Generator) -> FloorPlan | None:

@@ -15,13 +15,15 @@ class SplitConfig:
         Name of the split, as in the names of runs.
     folder : str, optional
         Frozen floor plans: a folder under the package's `assets/floor_plans`, or any folder.
-        Files `train_*.json`, `val_*.json`; all others are test apartments.
+        Files `train_*.json`, `val_*.json`; all others are test apartments. The settings below are
+        those of generated apartments and are not read with a folder.
     seed : int
-        First seed of the generator; ignored with a folder.
+        Seed of the generator. An apartment depends on it, on its part and on its number in the
+        part, and not on the number of apartments.
     size : str
         Size of generated apartments, a key of `avn.apartments.generator.SIZES`.
     train, validation, test : int
-        Number of apartments to generate; ignored with a folder.
+        Number of apartments to generate.
     train_sources, sources : int
         Number of source cells of each training apartment, and of each other one.
     """

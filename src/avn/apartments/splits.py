@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
-from avn.apartments.floor_plan import FloorPlan, load
+from avn.apartments.floor_plan import FloorPlan
+from avn.apartments.floor_plan_file import load
 from avn.apartments.generator import SIZES, generate
 from avn.apartments.settings import SplitConfig
-from avn.apartments.symmetry import layout_key
+from avn.apartments.symmetry import Key, layout_key
 from avn.core.errors import UserError
+from avn.core.random import derive
 
 PARTS = ("train", "validation", "test")
 FROZEN = Path(__file__).parents[1] / "assets" / "floor_plans"
-# Seeds that are tried for one apartment of a new layout.
-_ATTEMPTS = 200
 
 
 def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
@@ -28,7 +29,8 @@ def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
     -------
     dict of list of FloorPlan
         Under `train`, `validation` and `test`; a folder may have apartments of some parts only.
-        Layouts of generated apartments are unique, also up to rotation and mirroring.
+        Layouts of generated apartments are unique, also up to rotation and mirroring; each layout
+        is reserved for one part, in all generated splits.
 
     Raises
     ------
@@ -43,17 +45,39 @@ def _frozen(name: str) -> dict[str, list[FloorPlan]]:
     folder = FROZEN / name
     folder = folder if folder.is_dir() else Path(name).expanduser()
     if not folder.is_dir():
-        raise UserError(f"split.folder: there is no folder {name}; give one with floor plans")
+        what = "is a file" if folder.is_file() else "does not exist"
+        raise UserError(f"split.folder: {name} {what}; give a folder of floor plans (*.json)")
     split: dict[str, list[FloorPlan]] = {part: [] for part in PARTS}
-    for path in sorted(folder.glob("*.json")):
-        plan = load(path)
-        if plan.name != path.stem:
-            raise UserError(f"{path}: the plan is named '{plan.name}'; name it like its file")
-        part = {"train": "train", "val": "validation"}.get(path.stem.split("_")[0], "test")
-        split[part].append(plan)
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith("."):
+            continue
+        if path.suffix.lower() in (".yaml", ".yml") or path.suffix == ".JSON":
+            raise UserError(f"{path}: not read; floor plans are files *.json, write it as one")
+        if path.suffix == ".json":
+            split[_part_of_file(path)].append(_named_like(path))
     if not any(split.values()):
         raise UserError(f"split.folder: no floor plan in {name}; add one, such as room_1.json")
     return split
+
+
+def _named_like(path: Path) -> FloorPlan:
+    plan = load(path)
+    if plan.name != path.stem:
+        raise UserError(f"{path}: the plan is named {plan.name!r}; name it like its file")
+    return plan
+
+
+def _part_of_file(path: Path) -> str:
+    """Return the part of a file by its name; refuse a name that is almost one of another part."""
+    parts = {"train": "train", "val": "validation"}
+    word = path.stem.split("_")[0]
+    similar = re.match("[a-z]*", path.stem.lower())[0]  # type: ignore[index]  # matches ""
+    if word not in parts and similar in ("train", "training", "val", "valid", "validation"):
+        raise UserError(
+            f"{path}: not clear whether it is a test apartment; name it train_*.json, val_*.json "
+            "or without that word"
+        )
+    return parts.get(word, "test")
 
 
 def _generated(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
@@ -64,20 +88,30 @@ def _generated(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
             raise UserError(f"split.{key} is {getattr(cfg, key)}; give at least 1")
     if cfg.seed < 0:
         raise UserError(f"split.seed is {cfg.seed}; give 0 or more")
-    seen = set()
-    seed = cfg.seed
-    split: dict[str, list[FloorPlan]] = {part: [] for part in PARTS}
-    names = {"train": "train", "validation": "val", "test": "room"}
-    for part in PARTS:
-        sources = cfg.train_sources if part == "train" else cfg.sources
-        for number in range(1, getattr(cfg, part) + 1):
-            for _ in range(_ATTEMPTS):
-                plan = generate(seed, f"{names[part]}_{number}", sources, cfg.size)
-                seed += 1
-                if layout_key(plan) not in seen:
-                    break
-            else:
-                raise UserError(f"split.{part}: no new layout of size {cfg.size}; ask for fewer")
-            seen.add(layout_key(plan))
-            split[part].append(plan)
-    return split
+    return {part: _generated_part(cfg, part) for part in PARTS}
+
+
+def _generated_part(cfg: SplitConfig, part: str) -> list[FloorPlan]:
+    """Generate the apartments of a part; each depends on those before it in the part, if at all."""
+    name = {"train": "train", "validation": "val", "test": "room"}[part]
+    sources = cfg.train_sources if part == "train" else cfg.sources
+    seen: set[Key] = set()
+
+    def is_new(layout: FloorPlan) -> bool:
+        key = layout_key(layout)
+        return key not in seen and part_of_layout(key) == part
+
+    plans = []
+    for index in range(getattr(cfg, part)):
+        seed = derive("apartment", cfg.seed, part, index)
+        plans.append(generate(seed, f"{name}_{index + 1}", sources, cfg.size, is_new))
+        seen.add(layout_key(plans[-1]))
+    return plans
+
+
+def part_of_layout(key: Key) -> str:
+    """Return the one part that may have a generated layout, whatever the seed of the split.
+
+    So a network never trains on a layout that another config tests.
+    """
+    return PARTS[derive("layout", *key) % len(PARTS)]

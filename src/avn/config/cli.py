@@ -234,6 +234,8 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
         # OmegaConf leaves the name of a key out of some of its messages
         first, *causes = dict.fromkeys(line for line in lines if "$FULL_KEY" not in line)
         known = [_known(link) for link in chain if _known(link)][:1]
+        if "Could not find 'split/" in first:
+            known.append("for a folder of floor plans give split.folder=PATH split.name=NAME")
         return "; ".join([first, *(cause for cause in causes[:1] if cause not in first), *known])
     return None
 

@@ -100,6 +100,13 @@ class Apartments:
         return OmegaConf.select(self.cfg, getattr(self.world, name))
 
     @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the split that the apartments depend on; a folder needs no generator."""
+        if self.node("split").folder is None:
+            return (self.world.split,)
+        return tuple(f"{self.world.split}.{key}" for key in ("name", "folder"))
+
+    @property
     def title(self) -> str:
         """Description of the apartments, for titles of stages."""
         return f"the {self.subset} apartments of '{self.node('split').name}'"
@@ -158,8 +165,8 @@ class PerApartment(Stage):
         self.apartments = apartments
 
     def consulted(self) -> Sequence[str]:
-        """Return the key of the split; the fingerprint holds its floor plans instead."""
-        return (self.apartments.world.split,)
+        """Return the keys of the split; the fingerprint holds its floor plans instead."""
+        return self.apartments.keys
 
     @property
     def folder(self) -> Path:

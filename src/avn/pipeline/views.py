@@ -9,6 +9,7 @@ from typing import Any
 from omegaconf import DictConfig
 
 from avn.apartments.floor_plan import FloorPlan
+from avn.core.errors import UserError
 from avn.core.files import check_name
 from avn.core.settings import typed
 from avn.dataset.build_views import ViewsFile, build_views
@@ -76,11 +77,17 @@ class RenderedViews(PerApartment):
         return seconds / max(1, self.cfg.processes)
 
     def check(self) -> None:
-        """Refuse an invalid renderer."""
+        """Refuse an invalid renderer, and apartments without light."""
         check_processes(self.cfg)
         check_name("renderer.name", self.cfg.renderer.name)
         renderer = typed(self.cfg.renderer)
         renderer_class(renderer).check(renderer)
+        for plan in self.apartments.plans:
+            if not plan.lamps and not plan.windows:
+                raise UserError(
+                    f"floor plan {plan.name}: has no lamp and no window, so its views would be "
+                    "black; add one to its file"
+                )
 
     def make(self) -> None:
         """Render the missing files in worker processes."""

@@ -51,7 +51,7 @@ def pattern(material: str, part: str, *names: object) -> Pattern:
     """
     rng = draw("pattern", material, part, *names)
     paint = _PAINTERS.get(material, _plaster)
-    kind = material if material in COLOURS[part] else "plaster"
+    kind = material if material in COLOURS[part] else _SIMILAR.get(material, "plaster")
     return paint(rng, part, kind)
 
 
@@ -173,6 +173,8 @@ def _ceiling(rng: np.random.Generator, part: str, kind: str) -> Pattern:
     return _finish(base * (1 + tone[..., None]), 2.0, 2.0)
 
 
+# Materials without colours and layouts of their own whose painter needs both.
+_SIMILAR = {"ceramic": "wall_tiles"}
 _PAINTERS: dict[str, Callable[[np.random.Generator, str, str], Pattern]] = {
     "parquet": _parquet,
     "wood": _parquet,
