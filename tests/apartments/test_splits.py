@@ -135,6 +135,7 @@ def test_a_layout_that_comes_again_is_passed_over(monkeypatch: pytest.MonkeyPatc
         ({"seed": -1}, r"split\.seed is -1; give 0 or more"),
         ({"size": "huge"}, r"split\.size is 'huge'; choose one of small"),
         ({"folder": "nowhere"}, r"split\.folder: nowhere does not exist; give a folder"),
+        ({"folder": ""}, r"split\.folder is empty; give a folder"),
         ({"folder": __file__}, r"split\.folder: .*test_splits\.py is a file; give a folder"),
     ],
 )
@@ -209,6 +210,19 @@ def test_a_file_that_may_be_meant_otherwise_is_refused(
         return
     with pytest.raises(UserError, match=rf"{name}: {message}"):
         load_split(SplitConfig(folder=str(folder)))
+
+
+def test_the_working_directory_is_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mini").mkdir()
+    copy_of_var(tmp_path / "mini")
+    monkeypatch.chdir(tmp_path / "mini")
+    assert [plan.name for plan in load_split(SplitConfig(folder="."))["train"]] == [
+        "train_1",
+        "train_2",
+    ]
+    monkeypatch.chdir(tmp_path)
+    sizes = [len(load_split(SplitConfig(folder=name))["test"]) for name in ("mini", "./mini")]
+    assert sizes == [1, 5]
 
 
 def test_a_folder_without_floor_plans_is_refused(tmp_path: Path) -> None:

@@ -40,6 +40,8 @@ def missing_error(command, *arguments):
         (("agent=random_walk", "microphone.gain=2"), "microphone.gain"),
         (("agent=random_walk", "training.acoustics=diffraction"), "training.acoustics"),
         (("agent=random_walk", "training.sounds=ring"), "training.sounds"),
+        (("agent=random_walk", "split.seed=3"), "split.seed"),
+        (("agent=random_walk", "split.train=4"), "split.train"),
         (("agent=greedy", "training.scenes=procedural", "training.scenes.size=big"), ""),
     ],
 )  # fmt: skip

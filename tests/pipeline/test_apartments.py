@@ -1,5 +1,6 @@
 """Apartments of the parts of a split, and the scenes that their stages make."""
 
+import json
 import shutil
 
 import pytest
@@ -11,6 +12,7 @@ from avn.core.errors import UserError
 from avn.pipeline.apartments import TRAINING, Apartments, apartments_of_all_subsets
 from avn.pipeline.scenes import DirectSound, Geometry
 from avn.pipeline.stage import build
+from avn.pipeline.views import RenderedViews
 
 FEW = ("split=mini", "acoustics.rays=300", "acoustics.seconds=0.2", "processes=1")
 
@@ -24,8 +26,17 @@ def test_a_part_without_apartments_is_named_where_it_is_needed(tmp_path):
     assert [own.subset for own in apartments_of_all_subsets(cfg)] == ["validation", "test"]
     with pytest.raises(UserError, match=r"split\.train is empty: no floor plan of that subset in"):
         Apartments(cfg, "train").plans  # noqa: B018
-    with pytest.raises(UserError, match=r"training\.scenes\.train is empty"):
+    with pytest.raises(UserError, match=r"training\.scenes\.train is empty.*training\.scenes=var"):
         Apartments(cfg, "train", TRAINING).plans  # noqa: B018
+
+
+def test_views_of_an_apartment_without_light_are_refused(tmp_path):
+    data = json.loads((FROZEN / "mini" / "room_1.json").read_text())
+    (tmp_path / "room_1.json").write_text(json.dumps({**data, "lamps": [], "windows": []}))
+    cfg = composed(f"split.folder={tmp_path}", "split.name=dark")
+    Geometry(cfg, Apartments(cfg, "test")).check()
+    with pytest.raises(UserError, match=r"floor plan room_1: has no lamp and no window"):
+        RenderedViews(cfg, Apartments(cfg, "test")).check()
 
 
 def test_cells_and_pairs_are_those_of_the_scenes(outputs):

@@ -42,8 +42,11 @@ def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
 
 
 def _frozen(name: str) -> dict[str, list[FloorPlan]]:
-    folder = FROZEN / name
-    folder = folder if folder.is_dir() else Path(name).expanduser()
+    if not name:
+        raise UserError("split.folder is empty; give a folder of floor plans (*.json)")
+    # only a plain name is one of the package, so that "." and "../mine" are folders of the user
+    is_own = name not in {path.name for path in FROZEN.iterdir()}
+    folder = Path(name).expanduser() if is_own else FROZEN / name
     if not folder.is_dir():
         what = "is a file" if folder.is_file() else "does not exist"
         raise UserError(f"split.folder: {name} {what}; give a folder of floor plans (*.json)")

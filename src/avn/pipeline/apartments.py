@@ -79,9 +79,11 @@ class Apartments:
         plans = _plans(split)[self.subset]
         if not plans:
             where = f" in {split.folder}" if split.folder else ""
+            elsewhere = ", or train in another split with training.scenes=var"
+            elsewhere = elsewhere if self.world == TRAINING else ""
             raise UserError(
                 f"{self.world.split}.{self.subset} is empty: no floor plan of that subset{where}; "
-                "add one (train_*.json, val_*.json, any other name for test)"
+                f"add one (train_*.json, val_*.json, any other name for test){elsewhere}"
             )
         return plans
 
