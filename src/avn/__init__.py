@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from avn.navigation.simulator import Simulator
     from avn.reporting.results import summarise
 
+from avn.core.caches import choose_cache_folders
+
 __version__ = "0.1.0"
+choose_cache_folders()
 
 # Module of each public name, or the module that the name stands for.
 _PUBLIC = {

@@ -185,11 +185,11 @@ def test_what_a_worker_refuses_is_said_in_one_line(flat, rules, tmp_path):
         training(spec, tmp_path).run()
 
 
-def test_more_workers_than_cores_are_warned_of(flat, rules, capsys, monkeypatch):
+def test_more_workers_than_cores_are_warned_of(flat, rules, capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
     monkeypatch.setattr(worker_pool, "SpawnedPool", lambda *_: None)
     spec = make_spec(random_tables([flat], rules), rules, workers=2)
-    worker_pool.start_pool(spec, None, [])
+    worker_pool.start_pool(spec, None, [], tmp_path)
     assert "2 workers share 1 cores" in capsys.readouterr().out
 
 

@@ -227,9 +227,8 @@ def export_wav(path: str | Path, clip: Tensor | NDArray[np.float32], rate: int =
     try:
         with atomic_write(target) as part:
             soundfile.write(part, scaled, rate, format="WAV", subtype="PCM_16")
-    except (OSError, soundfile.SoundFileError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise UserError(f"{target} cannot be written ({reason}); choose another place") from None
+    except soundfile.SoundFileError as error:
+        raise UserError(f"{target} cannot be written ({error}); choose another place") from None
 
 
 def fade_samples(rate: int) -> int:

@@ -28,6 +28,8 @@ from avn.config.audio_source import quoted
 from avn.config.folder import conf_folder, without_folders
 from avn.config.help import help_text, is_asked
 from avn.core.errors import UserError
+from avn.core.files import write_failure
+from avn.core.signals import exit_code_of
 
 # Groups of the training world, from their key to Hydra's spelling. Apartments and acoustics are
 # those of the test world unless they are set.
@@ -44,15 +46,16 @@ USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLErr
 def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]], Callable[[], int]]:
     """Decorate a function of the composed config as a command.
 
-    The command returns the exit code: 0, 1 for an internal error, 2 for a mistake of the user,
-    130 when interrupted. `--help` is answered without composing a config.
+    The command returns the exit code: 0, 1 for an internal error, 2 for a mistake of the user, and
+    those of `avn.core.signals.exit_code_of`. `--help` is answered without composing a config.
     """
 
     def decorate(task: Callable[[DictConfig], Path | None]) -> Callable[[], int]:
         def main() -> int:
             if is_asked(sys.argv[1:]):
                 return plainly(f"avn.{config_name}", lambda: _help(config_name))
-            return _run(config_name, task)
+            name = f"avn.{config_name}"
+            return exit_code_of(name, lambda: _run(config_name, task))
 
         return main
 
@@ -98,9 +101,6 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
         if errors:
             return _report(name, errors[0], explain(errors[0]))
         return sweeps.end(name)
-    except KeyboardInterrupt:
-        print(f"{name}: interrupted", file=sys.stderr)
-        return 130
     except Exception as error:
         return _report(name, error, explain(error, composed=False))
     finally:
@@ -124,14 +124,15 @@ def _compose_and_do(config_name: str, job: Callable[[DictConfig], None]) -> None
 
 def plainly(name: str, task: Callable[[], None]) -> int:
     """Run a command without a Hydra config; the exit codes are those of `command`."""
-    try:
-        task()
-    except KeyboardInterrupt:
-        print(f"{name}: interrupted", file=sys.stderr)
-        return 130
-    except Exception as error:
-        return _report(name, error, explain(error))
-    return 0
+
+    def run() -> int:
+        try:
+            task()
+        except Exception as error:
+            return _report(name, error, explain(error))
+        return 0
+
+    return exit_code_of(name, run)
 
 
 def _report(name: str, error: Exception, line: str | None) -> int:
@@ -229,6 +230,8 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
     for link in chain:
         if isinstance(link, OSError) and link.filename and not isinstance(link, HydraException):
             return _one_line(f"{link.filename}: {link.strerror}")
+    if line := write_failure(error, "outputs"):
+        return _one_line(line)
     if not composed or isinstance(error, USER_MISTAKES):
         lines = (_one_line(str(link)) for link in chain if str(link))
         # OmegaConf leaves the name of a key out of some of its messages

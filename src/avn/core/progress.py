@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from rich.console import Console
 from rich.progress import (
@@ -17,6 +17,10 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.text import Text
+
+from avn.core.heartbeat import Work, format_duration, reported
+
+__all__ = ["bars_in", "format_duration", "log", "progress_bar", "progress_columns", "working"]
 
 # Progress displays of open dashboards, the last of which takes new bars.
 _shared: list[Progress] = []
@@ -51,8 +55,12 @@ def bars_in(progress: Progress) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(what: str, total: int, unit: str) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar on the error stream, or in an open dashboard.
+def progress_bar(
+    what: str, total: int, unit: str, done: int = 0
+) -> Iterator[Callable[[int], None]]:
+    """Show progress on the error stream: a bar, or lines where it is no terminal.
+
+    Inside of an open dashboard the bar is part of it. The lines are those of `avn.core.heartbeat`.
 
     Parameters
     ----------
@@ -62,6 +70,8 @@ def progress_bar(what: str, total: int, unit: str) -> Iterator[Callable[[int], N
         Number of units of work.
     unit : str
         Name of the units, in the plural.
+    done : int
+        Number of units that were done before.
 
     Yields
     ------
@@ -70,22 +80,38 @@ def progress_bar(what: str, total: int, unit: str) -> Iterator[Callable[[int], N
     """
     if _shared:
         progress = _shared[-1]
-        task = progress.add_task(what, total=total, unit=unit)
+        task = progress.add_task(what, total=total, completed=done, unit=unit)
         try:
             yield lambda count: progress.advance(task, count)
         finally:
             progress.remove_task(task)
         return
-    with progress_columns(Console(file=sys.stderr)) as progress:
-        task = progress.add_task(what, total=total, unit=unit)
+    console = Console(file=sys.stderr)
+    if not console.is_terminal:
+        with reported(Work(what, total, unit, done)) as work:
+            yield work.advance
+        return
+    with progress_columns(console) as progress:
+        task = progress.add_task(what, total=total, completed=done, unit=unit)
         yield lambda count: progress.advance(task, count)
+
+
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Say from time to time how long the block has lasted, where no terminal shows it.
+
+    A progress bar of the block says more, and replaces this while it is open.
+
+    Parameters
+    ----------
+    what : str
+        Description of the work.
+    """
+    terminal = _shared or Console(file=sys.stderr).is_terminal
+    with nullcontext() if terminal else reported(Work(what)):
+        yield
 
 
 def log(line: str) -> None:
     """Print one line for the user, at once."""
     print(line, flush=True)
-
-
-def format_duration(seconds: float) -> str:
-    """Format a duration in seconds, such as `40 s` or `2.5 min`."""
-    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.1f} min"

@@ -24,7 +24,7 @@ from avn.apartments.grid import Grid, build_grid, source_cells
 from avn.apartments.surfaces import build_surfaces, line_of_sight
 from avn.apartments.walls import walls
 from avn.core.errors import UserError
-from avn.core.files import atomic_write
+from avn.core.files import atomic_write, partial_folder
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene_file
@@ -160,8 +160,8 @@ def build_reverberation(
     todo = [job for scene_jobs in jobs for job in scene_jobs if not job.part.is_file()]
     total = sum(len(job.cells) for scene_jobs in jobs for job in scene_jobs)
     if total:
-        with progress_bar("tracing sound", total, "pairs") as advance:
-            advance(total - sum(len(job.cells) for job in todo))
+        before = total - sum(len(job.cells) for job in todo)
+        with progress_bar("tracing sound", total, "pairs", before) as advance:
             for done in in_processes(_render_reverberation, todo, processes):
                 advance(done)
     for (scene, path, fingerprint), scene_jobs in zip(files, jobs, strict=True):
@@ -169,7 +169,7 @@ def build_reverberation(
 
 
 def _jobs(scene: Scene, acoustics: AcousticsConfig, path: Path) -> list[_Job]:
-    parts, centres = path.parent / f".{path.stem}", scene.grid.centres
+    parts, centres = partial_folder(path), scene.grid.centres
     return [
         _Job(scene.plan, acoustics, tuple(centres[cell]), centres, parts / f"source-{k:03d}.npz")
         for k, cell in enumerate(scene.sources)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid
-from avn.core.files import atomic_write
+from avn.core.files import atomic_write, partial_folder
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene_file
@@ -64,7 +64,7 @@ class _Lighting:
     @property
     def file(self) -> Path:
         """Temporary file of the lighting."""
-        return self.views.path.parent / f".{self.views.path.stem}" / "light.npz"
+        return partial_folder(self.views.path) / "light.npz"
 
 
 @dataclass(frozen=True)
@@ -101,16 +101,16 @@ def build_views(files: Sequence[ViewsFile], cfg: RendererConfig, processes: int)
     lightings = [_Lighting(own, cfg) for own in files]
     unlit = [job for job in lightings if not job.file.is_file()]
     if unlit:
-        with progress_bar("lighting", len(lightings), "apartments") as advance:
-            advance(len(lightings) - len(unlit))
+        before = len(lightings) - len(unlit)
+        with progress_bar("lighting", len(lightings), "apartments", before) as advance:
             for done in in_processes(_light, unlit, processes):
                 advance(done)
     chunks = [_renderings(light) for light in lightings]
     todo = [job for own in chunks for job in own if not job.file.is_file()]
     if todo:
         total = sum(job.last - job.first for own in chunks for job in own)
-        with progress_bar("rendering", total, "views") as advance:
-            advance(total - sum(job.last - job.first for job in todo))
+        before = total - sum(job.last - job.first for job in todo)
+        with progress_bar("rendering", total, "views", before) as advance:
             for done in in_processes(_render, todo, processes):
                 advance(done)
         _OPENED.clear()

@@ -13,6 +13,7 @@ import lightning as L
 import torch
 from lightning.pytorch.callbacks import Callback, EarlyStopping, ModelCheckpoint
 from lightning.pytorch.loggers import TensorBoardLogger
+from lightning.pytorch.plugins.environments import LightningEnvironment
 
 from avn.core.errors import UserError
 from avn.core.prefetch import threads_for_one_operation
@@ -97,8 +98,13 @@ def fit(
             enable_model_summary=False,
             log_every_n_steps=20,
             deterministic=torch.cuda.is_available(),
+            # one process, also within a job of a batch system, whose tasks Lightning would count
+            plugins=LightningEnvironment(),
         )
-        trainer.fit(model, data, ckpt_path=str(last) if last.exists() else None)
+        try:
+            trainer.fit(model, data, ckpt_path=str(last) if last.exists() else None)
+        except SystemExit as error:  # of Lightning, for Ctrl-C outside of a command
+            raise KeyboardInterrupt from error
     if trainer.interrupted or not trainer.state.finished:
         raise KeyboardInterrupt  # Lightning swallows it, and an unfinished network is none
     load_weights(model, folder / BEST)

@@ -115,14 +115,6 @@ class SceneBatch:
         frame, begin = origin or self.origin(start)
         return self.poses[frame + state] - begin
 
-    def share(self) -> SceneBatch:
-        """Move all tensors to shared memory, and return the batch itself."""
-        for value in vars(self).values():
-            for tensor in value.values() if isinstance(value, dict) else [value]:
-                if isinstance(tensor, Tensor):
-                    tensor.share_memory_()
-        return self
-
 
 def advance(
     tables: SceneBatch, goal_row: Tensor, state: Tensor, action: Tensor

@@ -19,7 +19,7 @@ from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid
 from avn.apartments.splits import PARTS, load_split
 from avn.core.errors import UserError
-from avn.core.files import check_name
+from avn.core.files import check_name, partial_folder
 from avn.core.hashing import digest
 from avn.core.settings import typed
 from avn.pipeline.stage import Stage
@@ -223,6 +223,19 @@ class PerApartment(Stage):
         """Delete the files of all apartments."""
         for path in self.paths:
             path.unlink(missing_ok=True)
+
+    def cells_left(self) -> int:
+        """Return the number of free cells of the apartments without a file."""
+        return sum(cells_of(self.apartments.plans[index]) for index in self.missing())
+
+    def pairs_left(self) -> int:
+        """Return the number of pairs of source and free cell of these apartments."""
+        plans = [self.apartments.plans[index] for index in self.missing()]
+        return sum(len(plan.sources) * cells_of(plan) for plan in plans)
+
+    def begun(self) -> bool:
+        """Return whether an apartment has temporary files of an interrupted attempt."""
+        return any(partial_folder(self.paths[index]).is_dir() for index in self.missing())
 
     def done(self) -> bool:
         """Return whether each apartment has its file."""

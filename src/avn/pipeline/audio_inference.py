@@ -38,7 +38,7 @@ BATCH = 96
 HEARING_SEED = 0
 MOST_REALISATIONS = 1000
 # Rough speed of inference on two cores, for estimates of durations.
-CLIPS_PER_SECOND = 800
+CLIPS_PER_SECOND = 1500
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class AudioInference(ApartmentTensors):
     def seconds(self) -> float:
         """Estimate the duration from the number of clips."""
         sounds = len(sound_files(self.cfg, self.apartments.world))
-        return 4 * self.apartments.pairs * sounds * self.realisations / CLIPS_PER_SECOND
+        return 4 * self.pairs_left() * sounds * self.realisations / CLIPS_PER_SECOND
 
     def check(self) -> None:
         """Refuse a number of realisations that is out of range, and another sampling rate."""

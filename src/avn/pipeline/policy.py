@@ -131,8 +131,10 @@ class Policy(Trained):
 
     def seconds(self) -> float:
         """Estimate the duration from the number of actions and the cost of each."""
-        microseconds = 30 + 30 * has_occupancy_model(self.cfg) + 30 * bool(self.cfg.baseline.memory)
-        return float(self.cfg.algorithm.total_steps * microseconds / 1e6 * 1.6)
+        recipe, parts = self.cfg.algorithm, 1 + has_occupancy_model(self.cfg)
+        parts += bool(self.cfg.baseline.memory)
+        microseconds = 48 * parts / min(2, max(1, recipe.workers))
+        return float(recipe.total_steps * microseconds / 1e6)
 
     def make(self) -> None:
         """Train the network, or resume an interrupted training."""

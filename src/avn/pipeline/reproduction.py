@@ -17,7 +17,7 @@ from avn.core.progress import format_duration, log
 from avn.pipeline.dashboard import Dashboard
 from avn.pipeline.run import Evaluation, agent_label
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import discard_if_forced, make, missing, missing_error, timings
+from avn.pipeline.stage import announce, discard_if_forced, make, missing, timings
 from avn.reporting import published, results, table
 from avn.reporting.finished_run import RESULTS, read_run
 from avn.reporting.table import PAPER_PROTOCOL
@@ -82,15 +82,10 @@ def _make_runs(configs: Sequence[DictConfig]) -> list[Path]:
         run.check()
     discard_if_forced(runs)
     steps = missing(runs)
-    for stage in steps:
-        if not (stage.cfg.auto or isinstance(stage, Evaluation)):
-            raise missing_error(stage)
-        log(f"to make: {stage.title} (about {format_duration(stage.seconds())})")
-    if steps:
-        log(f"all in all about {format_duration(sum(stage.seconds() for stage in steps))}")
+    announce(steps, {run.fingerprint for run in runs})
     paper = published.paper_averages() if configs[0].protocol.name == PAPER_PROTOCOL else {}
     rows = dict.fromkeys(cfg.agent.name for cfg in configs)
-    with Dashboard([(s.title, s.seconds()) for s in steps], list(rows), paper) as board:
+    with Dashboard([(s.title, s.expected()) for s in steps], list(rows), paper) as board:
         table = _Rows(runs, board)
         table.fill()
         for stage in steps:

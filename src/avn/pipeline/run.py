@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,13 @@ from avn.apartments.splits import PARTS
 from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.files import atomic_write, check_name
+from avn.core.progress import progress_bar
 from avn.dataset.scene import Scene
 from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
 from avn.navigation.exploration import EXPLORATIONS
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
+from avn.navigation.simulator import Simulator
 from avn.pipeline import perception_tables
 from avn.pipeline.agent import (
     agent_ignored,
@@ -128,8 +130,12 @@ class Evaluation(Stage):
         return Path(self.cfg.outputs) / "eval" / self.cfg.agent.name / sounds / name
 
     def seconds(self) -> float:
-        """Estimate 3 s, or 15 s for an agent with a map or a network."""
-        return 15.0 if self.cfg.planner._target_ or learns(self.cfg) else 3.0
+        """Estimate 5 ms per episode of an agent with a map or a network, 0.5 ms of others."""
+        plans, sounds = self.apartments.plans, len(sound_files(self.cfg))
+        episodes = self.cfg.protocol.num_starts * sounds * sum(len(own.sources) for own in plans)
+        if self.cfg.episodes == "exhaustive":
+            episodes = 4 * self.apartments.pairs * sounds
+        return episodes * (0.005 if self.cfg.planner._target_ or learns(self.cfg) else 0.0005)
 
     def check(self) -> None:
         """Refuse options that cannot work, before anything is made."""
@@ -212,12 +218,29 @@ def rollout_scenes(
         acoustics=cfg.acoustics.name,
         look=cfg.look if cfg.planner._target_ else "once",
     )
-    return [
-        rollout_scene(
-            agent, scene, episodes_of(cfg, scene, protocol), protocol, labels, observed, watch
-        )
-        for scene, observed in zip(scenes, observations, strict=True)
-    ]
+    episodes = [episodes_of(cfg, scene, protocol) for scene in scenes]
+    total = sum(len(own.start) for own in episodes)
+    with progress_bar(f"walking of '{labels.agent}'", total, "episodes") as advance:
+        return [
+            rollout_scene(
+                agent, scene, own, protocol, labels, observed, watch or _counting(advance)
+            )
+            for scene, own, observed in zip(scenes, episodes, observations, strict=True)
+        ]
+
+
+def _counting(advance: Callable[[int], None]) -> Watch:
+    """Return a callback that counts the episodes of a scene that have ended."""
+    counted = 0
+
+    def watch(simulator: Simulator, *_: Any) -> bool:
+        nonlocal counted
+        ended = int(simulator.done.sum())
+        advance(ended - counted)
+        counted = ended
+        return False
+
+    return watch
 
 
 def episodes_of(cfg: DictConfig, scene: Scene, protocol: Protocol) -> Episodes:

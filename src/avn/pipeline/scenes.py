@@ -116,7 +116,7 @@ class LateReverberation(_Acoustic):
 
     def seconds(self) -> float:
         """Estimate 20 ms per pair of source and cell."""
-        return self.apartments.pairs * 0.02 / max(1, self.cfg.processes)
+        return self.pairs_left() * 0.02 / max(1, self.cfg.processes)
 
     def path_of(self, plan: FloorPlan, fingerprint: str) -> Path:
         """Return the path of an apartment's file."""

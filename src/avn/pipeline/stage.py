@@ -11,7 +11,7 @@ from __future__ import annotations
 import shutil
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
@@ -20,11 +20,12 @@ from typing import Any, ClassVar
 from omegaconf import DictConfig
 
 from avn.core.errors import UserError
-from avn.core.files import locked
+from avn.core.files import locked, writing
 from avn.core.hashing import digest
-from avn.core.progress import format_duration, log
+from avn.core.progress import format_duration, log, working
 from avn.core.settings import leaves, values
 from avn.core.sources import outside_sources
+from avn.pipeline.estimates import expected, record
 
 # Settings that every stage reads and that change no product.
 MACHINE = ("outputs", "processes", "auto", "force")
@@ -90,8 +91,12 @@ class Stage(ABC):
         """Folder of the product, which may not exist yet."""
 
     def seconds(self) -> float:
-        """Estimate the duration on two cores in seconds, without that of its needs."""
+        """Estimate the duration of what is missing, on two cores, in seconds, without its needs."""
         return 0.0
+
+    def begun(self) -> bool:
+        """Return whether an interrupted attempt has made a part of it."""
+        return False
 
     def check(self) -> None:
         """Raise `UserError` for settings that cannot work, before anything is built."""
@@ -141,6 +146,10 @@ class Stage(ABC):
     def discard(self) -> None:
         """Delete the product, so that it is made anew."""
         shutil.rmtree(self.folder, ignore_errors=True)
+
+    def expected(self) -> float:
+        """Return its `seconds`, corrected by the durations of its kind on this machine."""
+        return expected(self.cfg.outputs, self.kind, self.seconds())
 
     def locks(self) -> Sequence[Path]:
         """Return the paths that only one process may write at a time, in a fixed order."""
@@ -220,8 +229,35 @@ def build(stage: Stage, explicit: bool = False) -> None:
     """
     if explicit:
         discard_if_forced([stage])
-    for step in missing([stage]):
-        make(step, explicit=explicit and step.fingerprint == stage.fingerprint)
+    steps, asked_for = missing([stage]), {stage.fingerprint} if explicit else set()
+    announce(steps, asked_for)
+    for step in steps:
+        make(step, explicit=step.fingerprint in asked_for)
+
+
+def announce(steps: Sequence[Stage], asked_for: Collection[str]) -> None:
+    """Print the stages to make and their expected durations, if there are several.
+
+    Parameters
+    ----------
+    steps : sequence of Stage
+        Result of `missing`.
+    asked_for : collection of str
+        Fingerprints of the stages that may be made where `auto` is false.
+
+    Raises
+    ------
+    UserError
+        Where another stage is missing and `auto` is false.
+    """
+    for step in steps:
+        if not (step.cfg.auto or step.fingerprint in asked_for):
+            raise missing_error(step)
+    if len(steps) > 1:
+        for step in steps:
+            log(f"to make: {step.title} (about {format_duration(step.expected())})")
+        total = sum(step.expected() for step in steps)
+        log(f"all in all about {format_duration(total)}")
 
 
 def discard_if_forced(stages: Iterable[Stage]) -> None:
@@ -246,12 +282,16 @@ def make(stage: Stage, explicit: bool = False) -> None:
             held.enter_context(locked(path, stage.title))
         if stage.done():
             return
-        about = f" (about {format_duration(stage.seconds())})" if stage.seconds() else ""
+        planned, whole = stage.seconds(), not stage.begun()
+        about = f" (about {format_duration(stage.expected())})" if planned else ""
         log(f"{stage.title} is missing: making it{about}")
         started = time.perf_counter()
-        stage.make()
+        with working(stage.title), writing(stage.folder):
+            stage.make()
         took = time.perf_counter() - started
         timings[stage.title] = timings.get(stage.title, 0.0) + took
+        if whole:
+            record(stage.cfg.outputs, stage.kind, planned, took)
         log(f"{stage.title} made in {format_duration(took)}: {stage.folder}")
 
 

@@ -12,7 +12,9 @@ from avn.core.classes import build_object
 from avn.core.progress import progress_bar
 from avn.modules.stop_threshold import CRITERIA, best_threshold, check_decision
 from avn.navigation.protocols import Protocol
-from avn.pipeline.audio_inference import AudioInference
+from avn.pipeline.apartments import TRAINING
+from avn.pipeline.audio_inference import CLIPS_PER_SECOND, AudioInference
+from avn.pipeline.sounds import sound_files
 from avn.pipeline.trained_on_clips import TrainedOnClips
 
 if TYPE_CHECKING:
@@ -75,6 +77,11 @@ class StopNetwork(TrainedOnClips):
         from avn.reporting.stop_figures import StopFigures
 
         return (StopFigures(),)
+
+    def seconds(self) -> float:
+        """Estimate the duration of the training and of the choice of thresholds."""
+        sounds = len(sound_files(self.cfg, TRAINING))
+        return super().seconds() + 4 * self.validation.pairs * sounds / CLIPS_PER_SECOND
 
     def measure(self, model: StopClassifier, data: StopData) -> dict[str, Any]:
         """Return thresholds and error rates over one realisation of every validation clip."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from avn.core.errors import UserError
 from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import file_hash
-from avn.modules.settings import BEST
+from avn.modules.settings import BEST, LAST
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.stage import Stage
 from avn.reporting.model_card import write_card
@@ -58,6 +58,10 @@ class Trained(Stage):
         """Return whether the training is finished."""
         return (self.folder / METRICS).is_file()
 
+    def begun(self) -> bool:
+        """Return whether an interrupted training has left a checkpoint."""
+        return (self.folder / LAST).is_file()
+
     def metrics(self) -> dict[str, Any]:
         """Read the metrics of the training; raise `UserError` where the file is damaged."""
         path = self.folder / METRICS
@@ -67,11 +71,11 @@ class Trained(Stage):
             raise UserError(f"{path}: damaged; delete {self.folder} to train again") from error
 
     def finish(self, metrics: dict[str, Any], recipe: dict[str, Any]) -> None:
-        """Write `metrics.json` and the model card, which mark the training as finished."""
+        """Write the model card and `metrics.json`, which marks the training as finished."""
         metrics = metrics | {CHECKSUM: file_hash(self.folder / BEST)}
+        write_card(self.folder, self.title, self._setting(), recipe, metrics)
         with atomic_write(self.folder / METRICS) as part:
             part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
-        write_card(self.folder, self.title, self._setting(), recipe, metrics)
 
     def check_weights(self) -> None:
         """Raise `UserError` where the best checkpoint has changed since the training."""

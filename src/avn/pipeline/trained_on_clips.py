@@ -10,8 +10,11 @@ from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.pipeline.apartments import TRAINING
 from avn.pipeline.scenes import DirectSound
-from avn.pipeline.sounds import dry_sounds, sounds_content
+from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
 from avn.pipeline.trained import Fitted
+
+# Clips that two cores train on in a second.
+CLIPS_PER_SECOND = 1000
 
 
 class TrainedOnClips(Fitted):
@@ -56,8 +59,12 @@ class TrainedOnClips(Fitted):
         return sounds_content(self.cfg, TRAINING)
 
     def seconds(self) -> float:
-        """Estimate the duration from the numbers of pairs and epochs."""
-        return float(4 * self.train.pairs * self.cfg[self.node].epochs / 600)
+        """Estimate the duration from the clips of an epoch, trained on and measured."""
+        recipe, sounds = self.cfg[self.node], len(sound_files(self.cfg, TRAINING))
+        clips = [4 * apartments.pairs * sounds for apartments in (self.train, self.validation)]
+        measured = sum(min(count, recipe.validation_clips) for count in clips)
+        trained = 4 * self.train.pairs * recipe.sounds_per_pair
+        return float(recipe.epochs * (trained + measured) / CLIPS_PER_SECOND)
 
     def clips(self) -> dict[str, Any]:
         """Return the common arguments of data modules of clips."""

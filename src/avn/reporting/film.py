@@ -63,7 +63,10 @@ def write_film(
     """
     with atomic_write(path) as part, tempfile.TemporaryDirectory() as folder:
         wave = Path(folder) / "sound.wav"
-        soundfile.write(wave, track, clips.shape[-1], subtype="PCM_16")
+        try:
+            soundfile.write(wave, track, clips.shape[-1], subtype="PCM_16")
+        except soundfile.SoundFileError as error:
+            raise UserError(f"{wave}: the sound cannot be written ({error}); free space") from error
         writer = imageio_ffmpeg.write_frames(
             str(part),
             SIZE,

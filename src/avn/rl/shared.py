@@ -1,9 +1,10 @@
-"""Parameters and RMSProp moments in shared memory, one vector each."""
+"""Parameters and RMSProp moments that workers share, one vector each."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import torch
 from torch import Tensor, nn
@@ -41,9 +42,9 @@ class SharedState:
 
     Attributes
     ----------
-    weights, moments : (P,) float32 tensors in shared memory
+    weights, moments : (P,) float32 tensors
         Parameters, and running means of squared gradients.
-    updates : (1,) int64 tensor in shared memory
+    updates : (1,) int64 tensor
         Number of applied gradients.
     """
 
@@ -54,8 +55,33 @@ class SharedState:
     @classmethod
     def of(cls, weights: Tensor) -> SharedState:
         """Create a state with copies of weights, moments of 0 and no updates."""
-        tensors = (weights.clone(), torch.zeros_like(weights), torch.zeros(1, dtype=torch.int64))
-        return cls(*(tensor.share_memory_() for tensor in tensors))
+        return cls(weights.clone(), torch.zeros_like(weights), torch.zeros(1, dtype=torch.int64))
+
+    def move_to(self, file: Path) -> None:
+        """Move the state to a file that processes map into memory, so that they share it.
+
+        Shared memory of the system would not do: that of a container has 64 MB by default.
+        """
+        mapped = self.mapped(file, len(self.weights))
+        for name, tensor in vars(mapped).items():
+            tensor.copy_(getattr(self, name))
+            setattr(self, name, tensor)
+
+    @classmethod
+    def mapped(cls, file: Path, count: int) -> SharedState:
+        """Map the file of `move_to`, made if missing, into memory.
+
+        Parameters
+        ----------
+        file : Path
+            The file; it may be deleted once all processes have mapped it.
+        count : int
+            Number of parameters P.
+        """
+        # the number of updates as the first 8 bytes, in the size of two numbers
+        numbers = torch.from_file(str(file), shared=True, size=2 + 2 * count, dtype=torch.float32)
+        updates, weights, moments = numbers.split([2, count, count])
+        return cls(weights, moments, updates.view(torch.int64))
 
     def apply(
         self, gradients: Tensor, rate: Callable[[int], float], alpha: float, eps: float

@@ -100,11 +100,14 @@ class Training:
         last = -(-updates // each)
         if rounds is not None:
             last = min(last, len(self._rounds()) + rounds)
-        with SummaryWriter(str(self.folder), purge_step=self.steps + 1) as writer:
+        bar = progress_bar(
+            f"training of {self.folder.name}", updates * recipe.workers, "batches", self._batches
+        )
+        with SummaryWriter(str(self.folder), purge_step=self.steps + 1) as writer, bar as advance:
             if not self.curve:
                 self._end_round({}, writer)
             if len(self._rounds()) < last:
-                self._go(last, each, updates, writer)
+                self._go(last, each, updates, writer, advance)
         return self.curve
 
     @property
@@ -120,29 +123,33 @@ class Training:
         """Return the entries of the curve after that of the untrained network."""
         return self.curve[1:]
 
-    def _go(self, last: int, each: int, updates: int, writer: SummaryWriter) -> None:
-        recipe = self.spec.recipe
-        pool = start_pool(self.spec, self.shared, self._states)
+    def _go(
+        self,
+        last: int,
+        each: int,
+        updates: int,
+        writer: SummaryWriter,
+        advance: Callable[[int], None],
+    ) -> None:
+        shown = self._batches
+
+        def progress() -> None:
+            nonlocal shown
+            done = self._batches
+            advance(done - shown)
+            shown = done
+
+        pool = start_pool(self.spec, self.shared, self._states, self.folder)
         try:
-            with progress_bar(self.folder.name, updates * recipe.workers, "batches") as advance:
-                shown = 0
-
-                def progress() -> None:
-                    nonlocal shown
-                    done = self._batches
-                    advance(done - shown)
-                    shown = done
-
-                progress()
-                for number in range(len(self._rounds()), last):
-                    started, before = time.perf_counter(), self.steps
-                    todo = min(each, updates - number * each)
-                    reports = pool.run_chunk(todo, progress)
-                    seconds = time.perf_counter() - started
-                    self._states = [state for _, state in reports]
-                    metrics = _mean([found for found, _ in reports])
-                    metrics["steps_per_second"] = (self.steps - before) / seconds
-                    self._end_round(metrics, writer)
+            for number in range(len(self._rounds()), last):
+                started, before = time.perf_counter(), self.steps
+                todo = min(each, updates - number * each)
+                reports = pool.run_chunk(todo, progress)
+                seconds = time.perf_counter() - started
+                self._states = [state for _, state in reports]
+                metrics = _mean([found for found, _ in reports])
+                metrics["steps_per_second"] = (self.steps - before) / seconds
+                self._end_round(metrics, writer)
         finally:
             pool.close()
 
@@ -174,8 +181,9 @@ class Training:
             part.write_text(json.dumps(self.curve, indent=1) + "\n")
 
     def _write(self, name: str, content: dict[str, Any]) -> None:
-        with atomic_write(self.folder / name) as part:
-            torch.save(content, part)
+        # by a file of Python, whose errors say why they happened
+        with atomic_write(self.folder / name) as part, part.open("wb") as file:
+            torch.save(content, file)
 
     def _resume(self) -> None:
         path = self.folder / LAST

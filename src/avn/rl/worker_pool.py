@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import pickle
+import tempfile
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any, Protocol
 
 import torch
-import torch.multiprocessing as mp
 
 from avn.core.errors import UserError
+from avn.core.files import writing
+from avn.core.processes import no_processes
 from avn.core.progress import log
+from avn.core.signals import leave_to_parent
 from avn.rl.shared import SharedState
 from avn.rl.worker import TrainingSpec, Worker
 
 Report = tuple[dict[str, float], dict[str, Any]]
 # Seconds between two updates of the progress.
 _LOOK = 0.2
+# Files of the workers: what each is to do, and the state that they share.
+_TASK, _SHARED = "task.pt", "shared.bin"
 
 
 class WorkerPool(Protocol):
@@ -79,14 +87,19 @@ class LocalPool:
 class SpawnedPool:
     """Pool of workers in processes of their own, with one thread each.
 
+    The workers map the apartments and the shared state from files, which are deleted as soon as all
+    have done so.
+
     Parameters
     ----------
     spec : TrainingSpec
         Apartments, protocol, network and algorithm.
     shared : SharedState
-        Weights and optimiser state of all workers.
+        Weights and optimiser state of all workers; moved to a file.
     states : list of dict
         State of each worker, or an empty list to begin.
+    folder : Path
+        Folder of the files while the workers start.
 
     Raises
     ------
@@ -95,20 +108,36 @@ class SpawnedPool:
     """
 
     def __init__(
-        self, spec: TrainingSpec, shared: SharedState, states: list[dict[str, Any]]
+        self,
+        spec: TrainingSpec,
+        shared: SharedState,
+        states: list[dict[str, Any]],
+        folder: Path,
     ) -> None:
-        context, count = mp.get_context("spawn"), spec.recipe.workers
-        spec.tables.share()
-        # kept, since an unreferenced semaphore is gone before its process opens it
-        self._locks = locks = _locks(context, spec.recipe.update_order, count)
         self._links: list[Connection] = []
-        self._processes = []
+        self._processes: list[Any] = []
+        try:
+            with writing(folder), tempfile.TemporaryDirectory(prefix=".", dir=folder) as files:
+                with (Path(files) / _TASK).open("wb") as file:
+                    torch.save((spec, states), file)
+                shared.move_to(Path(files) / _SHARED)
+                self._start(spec.recipe.workers, spec.recipe.update_order, Path(files), shared)
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self, count: int, order: str, files: Path, shared: SharedState) -> None:
+        context = multiprocessing.get_context("spawn")
+        try:
+            # kept, since an unreferenced semaphore is gone before its process opens it
+            self._locks = locks = _locks(context, order, count)
+        except OSError as error:
+            raise no_processes("algorithm.workers", error) from error
         for rank in range(count):
             ours, theirs = context.Pipe()
             lock = (locks[rank], locks[(rank + 1) % count])
-            state = states[rank] if states else None
             process = context.Process(
-                target=_work, args=(rank, spec, shared, lock, theirs, state), daemon=True
+                target=_work, args=(rank, files, len(shared.weights), lock, theirs), daemon=True
             )
             process.start()
             theirs.close()
@@ -134,7 +163,7 @@ class SpawnedPool:
 
     def _report(self, rank: int) -> Any:
         try:
-            kind, found = self._links[rank].recv()
+            kind, found = pickle.loads(self._links[rank].recv_bytes())
         except (EOFError, ConnectionError):
             self._processes[rank].join(5)
             code = self._processes[rank].exitcode
@@ -152,7 +181,7 @@ class SpawnedPool:
     def close(self) -> None:
         """End the processes."""
         for process in self._processes:
-            process.terminate()
+            process.kill()
         for process in self._processes:
             process.join()
 
@@ -173,26 +202,32 @@ def _lock(own: Any, following: Any) -> Iterator[None]:
 
 def _work(
     rank: int,
-    spec: TrainingSpec,
-    shared: SharedState,
+    files: Path,
+    parameters: int,
     locks: tuple[Any, Any],
     link: Connection,
-    state: dict[str, Any] | None,
 ) -> None:
     """Run rounds in a process until it is ended."""
+    leave_to_parent()
     torch.set_num_threads(1)
 
     def lock() -> AbstractContextManager[None]:
         return _lock(*locks)
 
+    def send(kind: str, content: Any) -> None:
+        # as bytes: a connection would send tensors through shared memory
+        link.send_bytes(pickle.dumps((kind, content)))
+
     try:
-        worker = Worker(rank, spec, shared, lock)
-        if state is not None:
-            worker.load_state_dict(state)
-        link.send(("done", None))
+        # written by the parent, so it may hold any class
+        spec, states = torch.load(files / _TASK, mmap=True, weights_only=False)
+        worker = Worker(rank, spec, SharedState.mapped(files / _SHARED, parameters), lock)
+        if states:
+            worker.load_state_dict(states[rank])
+        send("done", None)
         while True:
             metrics = worker.run_chunk(link.recv())
-            link.send(("done", (metrics, worker.state_dict())))
+            send("done", (metrics, worker.state_dict()))
     except (EOFError, KeyboardInterrupt):
         return
     except UserError as error:
@@ -202,10 +237,12 @@ def _work(
         where = f"{os.path.basename(last.filename)}:{last.lineno}"
         answer = ("died", f"{type(error).__name__}: {error} ({where})")
     with suppress(OSError):  # if the parent has ended
-        link.send(answer)
+        send(*answer)
 
 
-def start_pool(spec: TrainingSpec, shared: SharedState, states: list[dict[str, Any]]) -> WorkerPool:
+def start_pool(
+    spec: TrainingSpec, shared: SharedState, states: list[dict[str, Any]], folder: Path
+) -> WorkerPool:
     """Start the workers of a training.
 
     Parameters
@@ -216,6 +253,8 @@ def start_pool(spec: TrainingSpec, shared: SharedState, states: list[dict[str, A
         Weights and optimiser state of all workers.
     states : list of dict
         State of each worker, or an empty list to begin.
+    folder : Path
+        Folder of the training, in which several workers have temporary files.
 
     Returns
     -------
@@ -227,4 +266,6 @@ def start_pool(spec: TrainingSpec, shared: SharedState, states: list[dict[str, A
             f"algorithm.workers: {workers} workers share {cores} cores and will wait for one "
             "another"
         )
-    return (LocalPool if workers == 1 else SpawnedPool)(spec, shared, states)
+    if workers == 1:
+        return LocalPool(spec, shared, states)
+    return SpawnedPool(spec, shared, states, folder)
