@@ -4,37 +4,41 @@ Every sound is converted to mono, one sampling rate, mean 0 and RMS 1, and is lo
 """
 
 import hashlib
-import io
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib import resources
 from math import gcd
 from pathlib import Path
 
 import numpy as np
-import soundfile
 from numpy.typing import NDArray
 
-from avn.acoustics.audio_files import missing_part
+from avn.acoustics.audio_decoder import DecodingError, Recording, decode
+from avn.acoustics.sound_names import BUILTIN
 from avn.core.errors import UserError
+from avn.core.progress import log
 
 RATE = 16000  # default sampling rate, Hz
-BUILTIN = ("ring", "alarm", "clock")
 
 SHORTEST_SECONDS = 0.01
 RATES = (1000, 768000)
 SILENCE = 1e-5  # RMS, -100 dB of full scale
+FULL_SCALE = 1 - 1.5 / 2**15  # of 16 bits
+LONGEST_PEAK = 3  # samples at full scale in a row that are not yet clipping
+CLIPPED = 0.001  # least share of clipped samples that is told
 LEAST_KEPT = 0.01  # share of the RMS that has to be below half the sampling rate: -40 dB
 
 
-def read_sound(path: str | Path, rate: int = RATE) -> NDArray[np.float32]:
+def read_sound(path: str | bytes | Path, rate: int = RATE) -> NDArray[np.float32]:
     """Read any audio file as a dry sound.
 
     Parameters
     ----------
-    path : str or Path
-        A file that libsndfile reads (WAV, FLAC, OGG, MP3, AIFF, ...), of any sampling rate and any
-        number of channels, or one of ``BUILTIN``. ``~`` is the home directory. The name of a
-        built-in sound has precedence over a file of the same name.
+    path : str, bytes or Path
+        A file of a format of docs/sounds.md (WAV, FLAC, OGG, MP3, M4A, AIFF, ...), of any sampling
+        rate and any number of channels, or one of ``BUILTIN``. ``~`` is the home directory. The
+        name of a built-in sound has precedence over a file of the same name.
     rate : int
         Sampling rate of the result in Hz.
 
@@ -49,19 +53,15 @@ def read_sound(path: str | Path, rate: int = RATE) -> NDArray[np.float32]:
     UserError
         If the file is missing, a folder, empty, not audio, truncated, shorter than 10 ms, silent
         (as a whole, after mixing of its channels, or below half the rate), or has samples that are
-        not finite.
+        not finite. A clipped recording and a wrong header are told in a line.
     """
-    from scipy.signal import resample_poly
-
-    content = _content(str(path))
-    samples, file_rate = _decode(content, str(path))
-    mixed = samples.mean(axis=1)
+    path = os.fsdecode(path)
+    mixed, file_rate = _decode(recording_bytes(path), path)
     mixed -= mixed.mean()
     loudness = _rms(mixed)
     if loudness < SILENCE:
         raise _error(path, "is silent once mixed to one channel", "take a recording that sounds")
-    common = gcd(rate, file_rate)
-    heard = resample_poly(mixed, rate // common, file_rate // common)
+    heard = _resampled(mixed, file_rate, rate)
     heard -= heard.mean()
     if _rms(heard) < LEAST_KEPT * loudness:
         wrong = f"is silent below {rate / 2000:g} kHz"
@@ -91,6 +91,9 @@ def load_sounds(mapping: Mapping[str, str], rate: int = RATE) -> dict[str, NDArr
         If `read_sound` raises it, or the mapping is empty.
     """
     _require_sounds(mapping)
+    for name, path in mapping.items():
+        if name in BUILTIN and path != name:
+            _tell_once(f"sound '{name}': {_readable(str(path))}, in place of the built-in {name}")
     return {name: read_sound(path, rate) for name, path in mapping.items()}
 
 
@@ -113,7 +116,10 @@ def content_hash(mapping: Mapping[str, str]) -> dict[str, str]:
         If a file is missing, a folder, empty or cannot be read, or the mapping is empty.
     """
     _require_sounds(mapping)
-    return {name: hashlib.sha256(_content(str(path))).hexdigest() for name, path in mapping.items()}
+    return {
+        name: hashlib.sha256(recording_bytes(str(path))).hexdigest()
+        for name, path in mapping.items()
+    }
 
 
 def _require_sounds(mapping: Mapping[str, str]) -> None:
@@ -126,12 +132,29 @@ def _choices() -> str:
     return f"{', '.join(BUILTIN)} or the path of an audio file"
 
 
-def _error(path: str | Path, wrong: str, remedy: str) -> UserError:
-    return UserError(f"sound file {path} {wrong}; {remedy}")
+def _error(path: str, wrong: str, remedy: str) -> UserError:
+    return UserError(f"sound file {_readable(path)} {wrong}; {remedy}")
 
 
-def _content(path: str) -> bytes:
-    """Read the bytes of a built-in sound or of a file."""
+def _readable(path: str) -> str:
+    """Return a path as text that can be written, also where its name is no valid UTF-8."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")
+
+
+@cache
+def _tell_once(line: str) -> None:
+    """Print a line, once in a process, since a sound is read several times."""
+    log(line)
+
+
+def recording_bytes(path: str) -> bytes:
+    """Read the bytes of a built-in sound or of a file.
+
+    Raises
+    ------
+    UserError
+        If the file is missing, a folder, empty or cannot be read.
+    """
     if path in BUILTIN:
         return (resources.files("avn") / "assets" / "dry_sounds" / f"{path}.flac").read_bytes()
     try:
@@ -151,61 +174,67 @@ def _content(path: str) -> bytes:
     return content
 
 
-class _Seekable(io.BytesIO):
-    """Stream of bytes that ignores seeks to before its start, which damaged headers cause.
-
-    libsndfile seeks through callbacks that cannot raise: an exception there is only printed.
-    """
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
-        """See `io.BytesIO.seek`."""
-        try:
-            return super().seek(offset, whence)
-        except ValueError:
-            return self.tell()
-
-
 def _decode(content: bytes, path: str) -> tuple[NDArray[np.float64], int]:
-    """Decode an audio file to samples (n, channels) and a rate in Hz; raise for a bad one."""
-    lost = missing_part(content)
-    again = "copy or convert it again"
+    """Decode an audio file to one channel and a rate in Hz; raise for a bad one."""
     try:
-        file = soundfile.SoundFile(_Seekable(content))
-    except (soundfile.SoundFileError, RuntimeError, TypeError, ValueError) as error:
-        if lost is not None:
-            raise _error(path, f"is truncated ({lost})", again) from None
-        remedy = "convert it to WAV, FLAC or OGG"
-        raise _error(path, f"is not audio that can be read ({_short(error)})", remedy) from None
-    with file:
-        promised, rate = file.frames, file.samplerate
-        try:
-            samples = file.read(dtype="float64", always_2d=True)
-        except (soundfile.SoundFileError, RuntimeError, ValueError, MemoryError) as error:
-            raise _error(path, f"is truncated or damaged ({_short(error)})", again) from None
-    if lost is None and len(samples) < promised:
-        lost = f"{len(samples)} of {promised} samples are there"
-    if lost is not None:
-        raise _error(path, f"is truncated ({lost})", again)
-    if not RATES[0] <= rate <= RATES[1]:
+        recordings = decode(content)
+    except DecodingError as error:
+        is_known = str(error).startswith("is truncated")
+        remedy = "copy or convert it again" if is_known else "convert it to WAV, FLAC or OGG"
+        raise _error(path, str(error), remedy) from None
+    rate = recordings[0].rate
+    if not all(RATES[0] <= recording.rate <= RATES[1] for recording in recordings):
         raise _error(path, f"has a sampling rate of {rate} Hz", "convert it to 16000 Hz")
-    _require_sound_samples(samples, rate, path)
-    return samples, rate
+    _require_sound_samples(recordings, path)
+    for recording in recordings:
+        _remark(recording, path)
+    mixed = [_resampled(one.samples.mean(axis=1), one.rate, rate) for one in recordings]
+    return (mixed[0] if len(mixed) == 1 else np.concatenate(mixed)), rate
 
 
-def _require_sound_samples(samples: NDArray[np.float64], rate: int, path: str) -> None:
-    """Raise a `UserError` for a recording that is empty, too short or not finite."""
-    if not len(samples):
+def _resampled(samples: NDArray[np.float64], rate: int, wanted: int) -> NDArray[np.float64]:
+    from scipy.signal import resample_poly
+
+    common = gcd(rate, wanted)
+    heard: NDArray[np.float64] = resample_poly(samples, wanted // common, rate // common)
+    return heard
+
+
+def _require_sound_samples(recordings: Sequence[Recording], path: str) -> None:
+    """Raise a `UserError` for recordings that are empty, too short or not finite."""
+    count = sum(len(recording.samples) for recording in recordings)
+    if not count:
         raise _error(path, "is empty (0 samples)", "take a recording that sounds")
-    if len(samples) < SHORTEST_SECONDS * rate:
-        wrong = f"is too short ({len(samples)} samples at {rate} Hz)"
+    if sum(len(recording.samples) / recording.rate for recording in recordings) < SHORTEST_SECONDS:
+        wrong = f"is too short ({count} samples at {recordings[0].rate} Hz)"
         raise _error(path, wrong, f"take one of at least {1000 * SHORTEST_SECONDS:.0f} ms")
-    if not np.isfinite(samples).all():
+    if not all(np.isfinite(recording.samples).all() for recording in recordings):
         raise _error(path, "has samples that are not numbers (NaN or infinite)", "export it again")
 
 
-def _short(error: Exception) -> str:
-    """Return the message of a library's error on one line."""
-    return " ".join(str(error).split()).rstrip(".") or type(error).__name__
+def _remark(recording: Recording, path: str) -> None:
+    """Print a line for a recording that is clipped, or whose header is wrong."""
+    if recording.remark:
+        _tell_once(f"sound file {_readable(path)} {recording.remark}")
+    share = _clipped(recording.samples)
+    if share >= CLIPPED:
+        _tell_once(
+            f"sound file {_readable(path)} is clipped: {100 * share:.1f} % of its samples are at "
+            "full scale; it is used as it is, record it at a lower level for a clean sound"
+        )
+
+
+def _clipped(samples: NDArray[np.float64]) -> float:
+    """Return the share of samples in long runs at full scale; 0 for float files beyond it."""
+    from scipy.ndimage import binary_opening
+
+    level = np.abs(samples)
+    if not len(level) or level.max() > 2:
+        return 0.0
+    at_top = level >= FULL_SCALE
+    # runs of more than LONGEST_PEAK samples: those that survive an opening by that length
+    kept = binary_opening(at_top, np.ones((LONGEST_PEAK + 1, 1), dtype=bool))
+    return float(kept.mean())
 
 
 def _rms(samples: NDArray[np.float64]) -> float:

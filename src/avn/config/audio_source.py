@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.object_type import ObjectType
 from hydra.plugins.config_source import ConfigLoadError, ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
-from omegaconf import OmegaConf
+from omegaconf import DictConfig, OmegaConf
 
-AUDIO_SUFFIXES = (".wav", ".flac", ".ogg", ".oga", ".opus", ".mp3", ".aif", ".aiff", ".au", ".caf")
+from avn.acoustics.sound_names import name_sounds
+
+AUDIO_SUFFIXES = (
+    *(".wav", ".wave", ".rf64", ".bw64", ".w64", ".aif", ".aiff", ".aifc", ".au", ".snd", ".caf"),
+    *(".flac", ".ogg", ".oga", ".opus", ".mp3", ".mp2", ".m4a", ".mp4", ".aac"),
+)
 _GROUP = "sound/"
 
 
@@ -35,8 +41,20 @@ def _quote(path: str) -> str:
     return f"'{escaped}'"
 
 
+def name_files(cfg: DictConfig) -> None:
+    """Name the audio files of a composed config; see `avn.acoustics.sound_names`."""
+    for holder, key in ((cfg, "sound"), (cfg.get("training"), "sounds")):
+        if holder is not None and isinstance(holder.get(key), DictConfig):
+            given: Any = OmegaConf.to_container(holder[key], resolve=True)
+            holder[key] = name_sounds(given)
+
+
 class AudioFiles(ConfigSource):
-    """Config source in which `sound/PATH.wav` holds the mapping {stem: PATH.wav}."""
+    """Config source in which `sound/PATH.wav` holds the mapping {PATH.wav: PATH.wav}.
+
+    Paths are distinct, so that no file of a list takes the place of another or of a built-in sound;
+    `name_files` replaces them by names.
+    """
 
     @staticmethod
     def scheme() -> str:
@@ -44,14 +62,14 @@ class AudioFiles(ConfigSource):
         return "audio"
 
     def load_config(self, config_path: str) -> ConfigResult:
-        """Return the mapping from the file's stem to its path."""
+        """Return the mapping from the file's path to itself."""
         if not self.is_config(config_path):
             raise ConfigLoadError(f"Config not found: {config_path}")
         path = config_path.removeprefix(_GROUP)
         return ConfigResult(
             provider=self.provider,
             path=self.full_path(),
-            config=OmegaConf.create({Path(path).stem: path}),
+            config=OmegaConf.create({path: path}),
             # without it, the folders of the path would become keys
             header={"package": "sound"},
         )

@@ -24,7 +24,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from avn.config import renamed, spare
-from avn.config.audio_source import quoted
+from avn.config.audio_source import name_files, quoted
 from avn.config.folder import conf_folder, without_folders
 from avn.config.help import help_text, is_asked
 from avn.core.errors import UserError
@@ -90,6 +90,7 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
             errors.append(error)
 
     def checked(cfg: DictConfig) -> Path | None:
+        name_files(cfg)
         check_keys(cfg)
         return task(cfg)
 
@@ -156,6 +157,7 @@ def arrange(arguments: Iterable[str]) -> list[str]:
     sweep, rest = [], []
     groups = _groups()
     for argument in arguments:
+        check_text(argument)
         key, equals, value = argument.partition("=")
         renamed.check_name(key.lstrip("+~"))
         if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
@@ -172,6 +174,15 @@ def arrange(arguments: Iterable[str]) -> list[str]:
             rest.append(argument)
     _check_training(rest)
     return sweep + rest
+
+
+def check_text(argument: str) -> None:
+    """Refuse an argument that is no text, such as a file's name that is not encoded as UTF-8."""
+    try:
+        argument.encode()
+    except UnicodeEncodeError:
+        shown = os.fsencode(argument).decode("utf-8", "backslashreplace")
+        raise UserError(f"{shown}: not valid UTF-8; rename the file or folder") from None
 
 
 def _check_training(arguments: list[str]) -> None:

@@ -6,6 +6,7 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
 from avn.config import spare
+from avn.config.audio_source import name_files
 from avn.config.spare import compose_fitting
 from avn.core.errors import UserError
 
@@ -30,6 +31,7 @@ def compose_row(cfg: DictConfig, row: str) -> DictConfig:
     """
     shared = [o for o in HydraConfig.get().overrides.task if o.split("=")[0] not in _OWN]
     config = compose_fitting("eval", [*shared, *spare.settings(), f"agent={row}"])
+    name_files(config)
     for name in cfg.sounds:
         if name not in config.sound:
             raise UserError(f"sounds: '{name}' is none of {', '.join(config.sound)}")

@@ -85,7 +85,11 @@ def summary(cfg: DictConfig, read: Collection[str]) -> list[str]:
 
 
 def _summary(cfg: DictConfig, key: str, read: set[str]) -> Iterable[str]:
-    below = {leaf for leaf in leaves(cfg, [key]) if leaf == key or leaf.startswith(f"{key}.")}
+    below = {
+        leaf
+        for leaf in leaves(cfg, [key])
+        if leaf == key or leaf.startswith((f"{key}.", f"{key}["))
+    }
     known, unread = sorted(below & read), sorted(below - read)
     if known and not unread:
         yield key

@@ -79,9 +79,14 @@ def _leaves(cfg: DictConfig, key: str, ignored: set[str], below: bool = False) -
     value = OmegaConf.select(cfg, key)
     if isinstance(value, DictConfig):
         for child in map(str, value):
-            yield from _leaves(cfg, f"{key}.{child}", ignored, below=True)
+            yield from _leaves(cfg, below_key(key, child), ignored, below=True)
     elif below or _holds(cfg, key):
         yield key
+
+
+def below_key(key: str, child: str) -> str:
+    """Return the dotted key of a child, in brackets where its own name has dots."""
+    return f"{key}[{child}]" if "." in child else f"{key}.{child}"
 
 
 def _referred(

@@ -127,6 +127,7 @@ class AudioInference(ApartmentTensors):
                 f"{self.clips.realisations}: {self.realisations} is out of range; give 1 to "
                 f"{MOST_REALISATIONS}"
             )
+        dry_sounds(self.cfg, self.apartments.world)  # refuses recordings that cannot be read
 
     def opened(self) -> Callable[[int], Tensor]:
         """Load the network and the scenes; return the function from index to outputs."""

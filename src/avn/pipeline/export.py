@@ -49,6 +49,8 @@ def generate(cfg: DictConfig) -> Path:
         raise UserError(f"export: '{cfg.export}' is none of {', '.join(EXPORTS)}")
     if cfg.export is None and (cfg.clips or cfg.apartments):
         raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
+    if cfg.export == "wav":
+        dry_sounds(cfg)  # a bad file is refused before anything is made
     stages = stages_of(cfg)
     discard_if_forced(with_needs(stages))
     for stage in missing(stages):

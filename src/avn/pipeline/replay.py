@@ -14,13 +14,16 @@ from typing import Any
 import pandas as pd
 from omegaconf import DictConfig
 
+from avn.acoustics.sound_names import BUILTIN
 from avn.agents.recorder import Recorder
 from avn.agents.rollout import Watch
 from avn.core.errors import UserError
-from avn.core.settings import plain
+from avn.core.settings import leaves, plain
 from avn.dataset.scene import Scene
 from avn.navigation.trace import Trace
+from avn.pipeline.recordings import has_recordings, with_recordings
 from avn.pipeline.run import Evaluation, rollout_scenes
+from avn.pipeline.sounds import sound_files, sounds_content
 from avn.pipeline.stage import MACHINE, build
 from avn.reporting.finished_run import read_run
 
@@ -55,9 +58,10 @@ class Run:
 
     @property
     def settings(self) -> dict[str, str]:
-        """Settings that the run reads, as dotted keys and texts."""
-        read = sorted(Evaluation(self.cfg).read())
-        return {key: str(plain(self.cfg, key)) for key in read}
+        """Settings that the run reads, as dotted keys and texts; sounds as hashes of recordings."""
+        read = sorted(Evaluation(self.cfg).read() - leaves(self.cfg, ["sound"]))
+        hashes = {f"sound.{name}": known for name, known in sounds_content(self.cfg)}
+        return {key: str(plain(self.cfg, key)) for key in read} | hashes
 
     @property
     def scenes(self) -> list[Scene]:
@@ -82,9 +86,19 @@ def open_run(folder: Path, cfg: DictConfig) -> Run:
     Raises
     ------
     UserError
-        Where its records are missing or damaged.
+        Where its records are missing or damaged, or a recording is no longer the one of the run.
     """
-    return Run(folder, cfg, *read_run(folder))
+    records = read_run(folder)
+    if has_recordings(folder):
+        cfg = with_recordings(cfg, folder)
+    elif not set(sound_files(cfg).values()) <= {*BUILTIN} and not _is_of(folder, cfg):
+        raise UserError(f"{folder}: its recordings have changed, or {_OTHER}")
+    return Run(folder, cfg, *records)
+
+
+def _is_of(folder: Path, cfg: DictConfig) -> bool:
+    """Return whether a run's folder is that of a config in this version, recordings included."""
+    return folder.resolve().name.endswith(Evaluation(cfg).fingerprint[:8])
 
 
 def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
@@ -230,7 +244,7 @@ def rollout_again(run: Run, wanted: Iterable[tuple[Sequence[int], bool]]) -> lis
 
     # a run of another version must not start the training of this version's networks
     cfg = run.cfg.copy()
-    same_version = run.folder.resolve().name.endswith(Evaluation(cfg).fingerprint[:8])
+    same_version = _is_of(run.folder, cfg)
     cfg.auto = cfg.auto and same_version
     try:
         records = _rollout(cfg, run.scenes, kept, watch)

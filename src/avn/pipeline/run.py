@@ -33,6 +33,7 @@ from avn.pipeline.apartments import Apartments
 from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import learns
+from avn.pipeline.recordings import keep_recordings
 from avn.pipeline.scenes import Geometry
 from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
 from avn.pipeline.stage import Stage
@@ -183,6 +184,7 @@ class Evaluation(Stage):
         _log(cfg, folder, summary)
         with atomic_write(folder / "config.yaml") as part:
             OmegaConf.save(cfg, part, resolve=True)
+        keep_recordings(cfg, folder)
         results.write_csv(episodes, folder / EPISODE_RECORDS)
         results.write_csv(summary, folder / RESULTS)
 

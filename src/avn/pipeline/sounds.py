@@ -8,6 +8,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from avn.acoustics.clips import DrySounds
 from avn.acoustics.dry_sounds import content_hash, load_sounds
+from avn.acoustics.sound_names import name_sounds
 from avn.core.errors import UserError
 from avn.core.files import check_name
 from avn.core.settings import plain
@@ -21,9 +22,10 @@ def sound_files(cfg: DictConfig, world: WorldKeys = TEST) -> dict[str, str]:
     Raises
     ------
     UserError
-        For an invalid or reserved name.
+        For an invalid or reserved name, and for files that would have one name.
     """
-    sounds = {str(name): str(path) for name, path in plain(cfg, world.sounds).items()}
+    given = {str(name): str(path) for name, path in plain(cfg, world.sounds).items()}
+    sounds = name_sounds(given)
     for name in sounds:
         check_name(world.sounds, name)
         if name == ALL_SOUNDS:

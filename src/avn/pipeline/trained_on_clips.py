@@ -32,10 +32,11 @@ class TrainedOnClips(Fitted):
     without: ClassVar[str]
 
     def check(self) -> None:
-        """Refuse a config without such a network, and an invalid recipe."""
+        """Refuse a config without such a network, an invalid recipe and unreadable recordings."""
         if self.cfg[self.node].name == "none":
             raise UserError(self.without)
         super().check()
+        dry_sounds(self.cfg, TRAINING)  # a bad file is refused before anything is made
 
     @property
     def rate(self) -> int:
