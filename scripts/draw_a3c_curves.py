@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-PARTS = ("training", "validation")
+PARTS = ("train", "validation")
 # The paper's order; other rows come after.
 ROWS = ("a3c_v", "a3c_va", "a3c_va_mapper", "a3c_va_m", "a3c_va_m_mapper")
 

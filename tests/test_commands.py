@@ -97,7 +97,7 @@ def test_a_failing_job_is_named_and_the_others_run(command, outputs):
     assert code == 2
     assert any("failed: " in line and "protocol.num_starts=100000" in line for line in err)
     assert "1 of 2 jobs failed" in err[-1]
-    assert any("1 seeds: SR" in line for line in out)
+    assert any("1 seed: SR" in line for line in out)
 
 
 def test_a_sound_that_is_missing_fails_its_own_job_alone(command, outputs):
@@ -288,3 +288,41 @@ def test_an_unknown_material_is_refused_before_anything_is_traced(command, tmp_p
     assert len(err) == 1
     assert "room_1" in err[0]
     assert "cheese" in err[0]
+
+
+def test_a_seed_that_is_named_twice_counts_once(command, tmp_path):
+    options = ("agent=random_walk", "split=mini", f"outputs={tmp_path}", "sound=alarm")
+    code, out, err = command("eval", *options, "seed=0,0,1", "-m")
+    assert code == 0, err
+    row = pd.read_csv(Path(out[-1]) / "results.csv").query("scene == 'average'")
+    rates = [
+        pd.read_csv(next(tmp_path.glob(f"eval/random_walk/alarm/seed{seed}-*/results.csv")))
+        .query("scene == 'average'")["sr"]
+        .item()
+        for seed in (0, 1)
+    ]
+    assert row["seeds"].item() == 2
+    assert row["sr"].item() == pytest.approx(np.mean(rates))
+    assert any("its figures mean nothing" in line for line in out)
+
+
+def test_no_table_of_mini_has_figures_of_the_paper(command, outputs):
+    options = (*fitting("agent=greedy", *SMALL), f"outputs={outputs}")
+    code, out, err = command("eval", "agent=greedy", *options)
+    assert code == 0, err
+    assert not any("Gan et al" in line for line in out)
+    headings = [
+        line
+        for line in out
+        if line.startswith(("success rate", "difficulty", "source estimates: "))
+    ]
+    assert len(headings) == 3
+    assert sum("its figures mean nothing" in line for line in out) == 3
+    code, out, err = command("reproduce", *options, "rows=random_walk,greedy", "seeds=0")
+    assert code == 0, err
+    assert not any("Gan et al" in line for line in out)
+    text = (Path(out[-1]) / "table.md").read_text()
+    assert "its figures mean nothing" in text
+    assert "test apartments of mini" in text
+    assert "too few sources" in text
+    assert pd.read_csv(Path(out[-1]) / "cells.csv")["paper_sr"].isna().all()

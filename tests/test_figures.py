@@ -37,12 +37,18 @@ def test_pictures_lie_in_the_run_and_in_tensorboard(command, outputs, capfd):
     events = list(Path(ours).glob("*.figures"))
     assert len(events) == 1
     tags = EventAccumulator(str(events[0])).Reload().Tags()["images"]
-    assert {"figures/breakdown", "figures/trajectories"} <= set(tags)
-    assert any(tag.startswith("figures/belief/") for tag in tags)
+    folder = f"typical-1-with-greedy-{Path(greedy).name}"
+    assert {f"figures/{folder}/breakdown", f"figures/{folder}/trajectories"} <= set(tags)
+    assert any(tag.startswith(f"figures/{folder}/belief/") for tag in tags)
+    # another selection stands beside it
+    before = pictures(ours)
+    assert figures.main([ours, "--count", "1"]) == 0
+    assert set(before) < set(pictures(ours))
+    assert len(list(Path(ours).glob("*.figures"))) == 2
 
 
 def pictures(folder: str) -> list[Path]:
-    return sorted((Path(folder) / "figures").glob("*.png"))
+    return sorted((Path(folder) / "figures").glob("*/*.png"))
 
 
 def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(command, outputs):
@@ -54,15 +60,29 @@ def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(com
         settings, metrics = hparams(found, run)
         assert settings["agent"].string_value == agent
         assert settings["seed"].number_value == 0
-        assert {"sr", "spl"} <= metrics
-        assert metrics <= set(found.Runs()[run]["scalars"])
-        assert "spl/all/average" in found.Runs()[run]["scalars"]
+        assert list(settings)[:4] == ["agent", "sound", "protocol", "acoustics"]
+        assert metrics[:2] == ["success", "spl"]
+        assert {"success", "spl", "by_distance/spl"} <= set(found.Runs()[run]["scalars"])
+        # a curve over the distance of the start in metres, and no dots of single scenes
+        steps = [event.step for event in found.Scalars(run, "by_distance/success")]
+        assert steps == sorted(steps)
+        assert len(steps) > 2
+        assert not [tag for tag in found.Runs()[run]["scalars"] if tag.count("/") == 2]
+        assert (settings["localisation"].string_value != "") == (agent == "ours_exp")
+    first = (list(settings), metrics)
     drawn = found.Runs()[str(Path(greedy).relative_to(outputs))]["images"]
     assert any(tag.startswith("figures/") for tag in drawn)
     trained = {name: tags for name, tags in found.Runs().items() if name.startswith("train/")}
     heard = {name: tags for name, tags in trained.items() if name.startswith("train/sound_cnn-")}
     assert heard
-    for tags in heard.values():
+    for name, tags in heard.items():
+        assert name.split("/")[2] == "sound_cnn-resonance-mini-ring+alarm+clock-seed0"
+        settings, metrics = hparams(found, name)
+        assert settings["kind"].string_value == "training"
+        assert settings["sounds_in_training"].string_value == "ring+alarm+clock"
+        # the columns of all rows of the HPARAMS tab are the same
+        assert (list(settings), metrics) == first
+        assert "best_validation" in tags["scalars"]
         assert {"loss/steps", "error_m/validation/all/all"} <= set(tags["scalars"])
         assert "audio/alarm/in_sight" in tags["audio"]
         assert "locations/alarm" in tags["images"]
@@ -71,7 +91,7 @@ def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(com
     assert all("windows" in tags["images"] and "loss/steps" in tags["scalars"] for tags in seen)
 
 
-def hparams(found: EventMultiplexer, run: str) -> tuple[dict[str, Any], set[str]]:
+def hparams(found: EventMultiplexer, run: str) -> tuple[dict[str, Any], list[str]]:
     """The settings of a run, and the names of the figures that it is compared by."""
 
     def read(tag: str) -> HParamsPluginData:
@@ -81,7 +101,8 @@ def hparams(found: EventMultiplexer, run: str) -> tuple[dict[str, Any], set[str]
 
     compared = read("experiment").experiment.metric_infos
     settings = read("session_start_info").session_start_info.hparams
-    return dict(settings), {info.name.tag for info in compared}
+    order = [info.name for info in read("experiment").experiment.hparam_infos]
+    return {name: settings[name] for name in order}, [info.name.tag for info in compared]
 
 
 def test_mistakes_are_one_line(command, outputs, capfd, tmp_path):

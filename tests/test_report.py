@@ -11,7 +11,7 @@ from small import EYES, SMALL, fitting
 from avn import report
 from avn.reporting import page_media
 from avn.reporting.page import PageRun, render
-from avn.reporting.results import summarise
+from avn.reporting.results import EPISODE_COLUMNS, summarise
 
 
 @pytest.fixture(scope="module")
@@ -64,17 +64,48 @@ def test_the_table_sorts_by_either_figure(browser, page):
         assert [float(value) for value in column(shown, last)] == values[::-1]
 
 
-def test_figures_are_those_of_the_run_with_intervals_and_the_papers(
+def test_figures_are_those_of_the_run_and_of_mini_they_mean_nothing(
     browser, page, command, outputs
 ):
     run = made(command, outputs, "greedy")
     table = pd.read_csv(run / "results.csv").query("sound == 'alarm' and scene == 'room_1'")
-    row = (100 * table[["sr", "spl", "sr_low", "sr_high"]]).iloc[0]
+    row = (100 * table[["sr", "spl"]]).iloc[0]
     with opened(browser, page) as shown:
         cell = shown.locator("td.cell[data-run='2'][data-sound=alarm][data-scene=room_1]")
-        assert cell.locator("b").inner_text() == f"{row['sr']:.1f} / {row['spl']:.1f}"
-        assert f"{row['sr_low']:.0f}–{row['sr_high']:.0f}" in cell.inner_text()
-        assert "paper 9.0 / 8.2" in cell.inner_text()
+        assert cell.inner_text().strip() == f"{row['sr']:.1f} / {row['spl']:.1f}"  # two sources
+        words = shown.locator("header").inner_text()
+        assert "too few sources (fewer than 5) for an interval" in words
+        assert "its figures mean nothing" in words
+        assert "test apartments of mini" in words
+        assert "paper" not in shown.locator("main").inner_text()
+
+
+def drawn_run(paper, values=(0.15146, 1.0), sources=5):
+    """A run of the page: episodes of five sources in two apartments with one sound."""
+    rows = [
+        dict.fromkeys(EPISODE_COLUMNS, 0)
+        | {"agent": "greedy", "protocol": "var", "acoustics": "resonance", "look": "once"}
+        | {"sound": "ring", "scene": scene, "source": source, "episode": source}
+        | {"geodesic": 2.0, "outcome": "success", "success": 1, "spl": values[0]}
+        for scene in ("room_1", "room_2")
+        for source in range(sources)
+    ]
+    episodes = pd.DataFrame(rows)
+    return PageRun(
+        "greedy", "", "", False, summarise(episodes), episodes, {}, paper=paper, world="protocol x"
+    )
+
+
+def test_figures_are_rounded_once_and_the_papers_stand_where_they_belong(browser, tmp_path):
+    for name, paper in (("with", ("ring",)), ("without", ())):
+        path = tmp_path / f"{name}.html"
+        path.write_text(render("Runs", [drawn_run(paper)], [], [], []), encoding="utf-8")
+        with opened(browser, path) as shown:
+            cell = shown.locator("td.cell[data-scene=room_1]")
+            assert cell.locator("b").inner_text() == "100.0 / 15.1"  # not 15.15, then 15.2
+            assert "15–15" in cell.inner_text()
+            assert ("paper 12.0 / 10.5" in cell.inner_text()) == bool(paper)
+            assert "Protocol x." in shown.locator("header").inner_text()
 
 
 def test_a_cell_opens_its_episodes_and_an_episode_plays(browser, page, command, outputs):
@@ -220,7 +251,7 @@ def test_runs_of_several_seeds_stand_together_too(browser, command, outputs, cap
             *("greedy, seeds 0, 1", "greedy, seed=0", "greedy, seed=1"),
             *("random_walk, seeds 0, 1", "random_walk, seed=0", "random_walk, seed=1"),
         }
-        cell = shown.locator("td.cell[data-run='0'][data-sound=all][data-scene=average]")
+        cell = shown.locator("td.cell[data-run='0'][data-sound=all][data-scene=room_1]")
         assert cell.locator("b").inner_text().startswith(f"{100 * episodes['success'].mean():.1f}")
         assert "over seeds" in cell.inner_text()
         cell.click()
@@ -238,7 +269,7 @@ def test_the_ways_of_all_episodes_on_request(browser, command, outputs, capfd, t
     assert report.main([str(folder), *options]) == 0
     episodes = pd.read_csv(folder / "episodes.csv")
     with opened(browser, path) as shown:
-        shown.locator("td.cell[data-sound=all][data-scene=average]").click()
+        shown.locator("td.cell[data-sound=all][data-scene=room_1]").click()
         rows = shown.locator("#episode-list tr.open")
         assert rows.count() == len(episodes)
         rows.first.click()
@@ -253,3 +284,39 @@ def test_the_ways_of_all_episodes_on_request(browser, command, outputs, capfd, t
         # it may be opened after one with sound, and that one again
         rows.first.click()
         until(shown, "document.getElementById('sound').readyState === 4")
+
+
+def test_two_runs_are_compared_episode_by_episode_with_the_keyboard(
+    browser, page, command, outputs
+):
+    one, other = (
+        pd.read_csv(made(command, outputs, agent) / "episodes.csv")
+        for agent in ("greedy", AGENTS[0])
+    )
+    both = one.merge(other, on=["scene", "sound", "episode"])
+    with opened(browser, page) as shown:
+        shown.locator("#run-a").select_option("2")
+        shown.locator("#run-b").select_option("0")
+        words = shown.locator("#compared").inner_text()
+        only = (both["success_x"] > both["success_y"]).sum()
+        assert f"{len(both)} common episodes. Only A succeeds: {only}." in words
+        rows = shown.locator("#pairs tbody tr")
+        assert rows.count() == len(both)
+        shown.locator("#who").select_option("00")
+        neither = both[["success_x", "success_y"]].max(axis=1) == 0
+        assert rows.count() == neither.sum()
+        shown.locator("#who").select_option("")
+        # the player is reached and operated with keys alone
+        shown.locator("#pairs button.opener").first.focus()
+        shown.keyboard.press("Enter")
+        assert shown.locator("#twins button").count() == 2
+        assert shown.evaluate("document.activeElement.id") == "player"
+        shown.keyboard.press("ArrowRight")
+        assert shown.locator("#caption").inner_text().startswith("step 1 of")
+        shown.keyboard.press("Home")
+        assert shown.locator("#caption").inner_text().startswith("step 0 of")
+        assert "facing" in shown.locator("#view").get_attribute("alt")
+        assert "room_1" in shown.locator("#plan-image").get_attribute("alt")
+    with opened(browser, page, PHONE) as shown:
+        shown.locator("#pairs button.opener").first.click()
+        assert not overflows(shown)

@@ -9,7 +9,7 @@ import yaml
 from small import A3C, EYES, SMALL, fitting
 
 from avn.core import sources
-from avn.pipeline.run import RESULTS
+from avn.reporting.finished_run import RESULTS
 
 AGENT = """
 import torch

@@ -20,36 +20,38 @@ _FINISHED = "results.csv"
 def main(cfg: DictConfig) -> Path:
     """Evaluate an agent, or read its finished run, and print the table."""
     simple = not (cfg.film or cfg.force)
-    folder = answers.recall("eval", cfg, _FINISHED) if simple else None
-    if folder is None:
+    answer = answers.recall("eval", cfg, _FINISHED) if simple else None
+    if answer is None:
         folder = _evaluate(cfg)
-        if simple:
-            answers.remember("eval", cfg, folder)
     else:
-        _show(cfg, folder)
+        from avn.reporting.finished_run import show_run
+
+        folder = answer.folder
+        show_run(folder, **answer.shown)
     log(str(folder))
     return folder
 
 
 def _evaluate(cfg: DictConfig) -> Path:
+    from avn.config.defaults import default_config
     from avn.pipeline import films
+    from avn.pipeline.benchmark import headings
     from avn.pipeline.run import Evaluation
     from avn.pipeline.stage import build
+    from avn.reporting.finished_run import show_run
 
     films.check(cfg)
     run = Evaluation(cfg)
     run.check()
     refuse_unread("eval", cfg, run.read() | films.read(cfg))
     build(run, explicit=True)
-    _show(cfg, run.folder)
-    films.make_films(cfg, run.folder)
+    default = default_config(cfg)
+    shown = headings(cfg, default)
+    show_run(run.folder, **shown)
+    films.make_films(cfg, run.folder, default)
+    if not cfg.film:
+        answers.remember("eval", cfg, run.folder, shown)
     return run.folder
-
-
-def _show(cfg: DictConfig, folder: Path) -> None:
-    from avn.reporting.finished_run import show_run
-
-    show_run(folder, cfg.agent.privileged)
 
 
 if __name__ == "__main__":

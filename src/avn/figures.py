@@ -1,6 +1,6 @@
 """`python -m avn.figures RUN [RUN...]`: draws figures of episodes of finished runs.
 
-Writes PNG files to the folder `figures/` of the first run, and the figures to its TensorBoard.
+Writes PNG files to the first run's `figures/<selection>/`, and the figures to its TensorBoard.
 """
 
 from __future__ import annotations
@@ -32,11 +32,13 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _draw(options: argparse.Namespace) -> None:
+    from avn.config.defaults import default_config
     from avn.config.saved import read_config
     from avn.pipeline import replay
     from avn.pipeline.run_figures import draw_runs
 
-    runs = [replay.open_run(folder, read_config(folder)) for folder in options.runs]
+    configs = [(folder, read_config(folder)) for folder in options.runs]
+    runs = [replay.open_run(folder, cfg, default_config(cfg)) for folder, cfg in configs]
     draw_runs(runs, options.show, options.count, options.episode)
 
 

@@ -44,11 +44,13 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _report(options: argparse.Namespace) -> None:
+    from avn.config.defaults import default_config
     from avn.config.saved import read_config
     from avn.pipeline import replay
     from avn.pipeline.report_page import write_page
 
-    runs = [replay.open_run(folder, read_config(folder)) for folder in options.runs]
+    configs = [(folder, read_config(folder)) for folder in options.runs]
+    runs = [replay.open_run(folder, cfg, default_config(cfg)) for folder, cfg in configs]
     log(str(write_page(runs, options.episodes, options.show, options.paths, options.output)))
 
 

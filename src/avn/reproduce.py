@@ -16,11 +16,12 @@ from avn.core.progress import log
 @command("reproduce")
 def main(cfg: DictConfig) -> Path:
     """Build what is missing, evaluate each row with each seed, and print the table."""
+    from avn.config.defaults import default_config
     from avn.pipeline.reproduction import reproduce, settings_of
 
     rows = [compose_row(cfg, row) for row in dict.fromkeys(cfg.rows)]
     refuse_unread("reproduce", cfg, settings_of(rows))
-    folder = reproduce(cfg, rows)
+    folder = reproduce(cfg, rows, [default_config(row) for row in rows])
     log(str(folder))
     return folder
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from avn.navigation.metrics import cluster_bootstrap, sna, soft_spl, spl
+from avn.navigation.metrics import MIN_CLUSTERS, cluster_bootstrap, sna, soft_spl, spl
 
 
 def test_spl_by_hand() -> None:
@@ -64,11 +64,19 @@ def test_bootstrap_covers_the_truth_about_as_often_as_it_says() -> None:
 
 
 def test_a_weight_counts_as_so_many_copies() -> None:
-    values, clusters = np.array([[1.0], [2.0], [4.0], [8.0]]), np.array(["x", "y", "z", "z"])
-    times = np.array([1, 2, 3, 1])
+    values = np.array([[1.0], [2.0], [4.0], [8.0], [16.0], [32.0]])
+    clusters, times = np.array(["v", "w", "x", "y", "z", "z"]), np.array([1, 2, 3, 1, 1, 2])
     copied = cluster_bootstrap(np.repeat(values, times, axis=0), np.repeat(clusters, times))
     assert np.allclose(cluster_bootstrap(values, clusters, times), copied)
     assert not np.allclose(cluster_bootstrap(values, clusters), copied)
+
+
+def test_few_clusters_have_no_interval() -> None:
+    values = np.random.default_rng(4).normal(size=(100, 3))
+    for clusters in (1, 2, MIN_CLUSTERS - 1):
+        assert np.isnan(cluster_bootstrap(values, np.arange(100) % clusters)).all()
+    low, high = cluster_bootstrap(values, np.arange(100) % MIN_CLUSTERS)
+    assert (low < high).all()
 
 
 def test_same_seed_same_interval() -> None:

@@ -54,3 +54,19 @@ def test_a_mistake_is_one_line(command, outputs, option, said):
     assert code == 2
     assert len(err) == 1
     assert said in err[0]
+
+
+def test_a_film_at_twice_the_speed_is_half_as_long_and_stands_beside(command, outputs):
+    code, out, err = run(command, outputs, "film=1")
+    assert code == 0, err
+    folder = Path(out[-1])
+    code, out, err = run(command, outputs, "film=1", "film_speed=2")
+    assert code == 0, err
+    assert Path(out[-1]) == folder
+    (fast,) = folder.glob("films/*-speed2.mp4")
+    slow = fast.with_name(fast.name.replace("-speed2", ""))
+    seconds = [imageio_ffmpeg.count_frames_and_secs(str(path))[1] for path in (fast, slow)]
+    assert 2 * seconds[0] == pytest.approx(seconds[1], abs=0.4)
+    code, _, err = run(command, outputs, "film=1", "film_speed=0")
+    assert code == 2
+    assert "film_speed: 0 is out of range; give steps per second, 0.5 to 10" in err[0]

@@ -51,11 +51,14 @@ def test_a_row_is_trained_measured_and_walks(command, outputs, row):
     assert {BEST, LAST, CURVE, METRICS, CARD} <= {path.name for path in folder.iterdir()}
     curve = json.loads((folder / CURVE).read_text())
     assert [own["steps"] for own in curve] == [0, 400, 800]
-    events = EventAccumulator(str(folder)).Reload().Tags()["scalars"]
+    (named,) = (path for path in folder.iterdir() if path.is_dir())
+    assert named.name.startswith(f"{row}-")
+    assert named.name.endswith("-seed0")
+    events = EventAccumulator(str(named)).Reload().Tags()["scalars"]
     wanted = {"return", "success", "spl"}
-    wanted = {f"{part}/{name}" for part in ("training", "validation") for name in wanted}
-    rates = {"train/return", "train/entropy", "loss/value", "train/gradient_norm"}
-    assert wanted | rates | {"train/steps_per_second"} <= set(events)
+    wanted = {f"{part}/{name}" for part in ("train", "validation") for name in wanted}
+    rates = {"steps/return", "steps/entropy", "loss/value", "steps/gradient_norm"}
+    assert wanted | rates | {"steps/steps_per_second"} <= set(events)
     code, out, err = command(
         "eval", f"agent={row}", *arguments(row, outputs, "sound=alarm", kind="agent")
     )

@@ -10,6 +10,7 @@ from omegaconf import OmegaConf
 from small import A3C, EYES, SMALL, composed, fitting
 
 from avn.config import saved
+from avn.config.defaults import default_config
 from avn.config.folder import conf_folder
 from avn.config.registry import register
 from avn.config.saved import read_config
@@ -22,7 +23,8 @@ from avn.reporting.results import write_csv
 
 
 def open_run(folder):
-    return replay.open_run(folder, read_config(folder))
+    cfg = read_config(folder)
+    return replay.open_run(folder, cfg, default_config(cfg))
 
 
 def made(command, outputs, agent, *more):
@@ -123,7 +125,8 @@ def episodes() -> pd.DataFrame:
         ("b", "clock", 1, 0.5, 0.5, 9.0),
     ]
     columns = ["scene", "sound", "success", "spl", "dtg", "geodesic"]
-    return pd.DataFrame(rows, columns=columns)
+    frame = pd.DataFrame(rows, columns=columns)
+    return frame.assign(source=0, start_cell=frame.index, start_heading=0)
 
 
 def test_what_is_chosen_is_typical_and_from_everywhere():
@@ -147,27 +150,18 @@ def test_a_saved_training_world_is_read_back_as_it_was(tmp_path):
     assert Evaluation(again).fingerprint == Evaluation(cfg).fingerprint
 
 
-def test_names_tell_what_a_setting_of_the_run_was_resolved_to(tmp_path):
-    runs = []
-    for seed, way in enumerate(("retrieval", "retrieval+odometry")):
-        folder = tmp_path / str(seed)
-        folder.mkdir()
-        cfg = composed("agent=ours_exp", "split=mini", f"localisation={way}", "train_seed=1")
-        (folder / "config.yaml").write_text(OmegaConf.to_yaml(cfg, resolve=True))
-        frame = pd.DataFrame()
-        runs.append(replay.Run(folder, read_config(folder), frame, frame))
-    assert replay.names_of(runs) == [
-        "ours_exp, localisation=retrieval",
-        "ours_exp, localisation=retrieval+odometry",
-    ]
-
-
-def test_names_tell_runs_apart_by_what_differs(command, outputs):
+def test_runs_of_the_same_episodes_find_them_in_each_other(command, outputs):
     one = open_run(made(command, outputs, "random_walk"))
     other = open_run(made(command, outputs, "random_walk", "seed=1"))
     third = open_run(made(command, outputs, "greedy"))
-    assert replay.names_of([one, third]) == ["random_walk", "greedy"]
-    assert replay.names_of([one, other]) == ["random_walk, seed=0", "random_walk, seed=1"]
     with pytest.raises(UserError, match="has other episodes"):
         replay.same_episodes(one, [0], other)
     assert replay.same_episodes(one, [2, 0], third) == [2, 0]
+
+
+def test_a_start_is_chosen_once_before_it_is_with_another_sound():
+    rows = [("a", sound, 0, 0.0, 3.0, 4.0, n) for sound in ("ring", "clock") for n in range(3)]
+    columns = ["scene", "sound", "success", "spl", "dtg", "geodesic", "start_cell"]
+    frame = pd.DataFrame(rows, columns=columns).assign(source=0, start_heading=0)
+    assert len(set(frame.loc[replay.choose(frame, "typical", 3), "start_cell"])) == 3
+    assert len(replay.choose(frame, "typical", 6)) == 6

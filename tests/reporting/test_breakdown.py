@@ -1,8 +1,9 @@
+import numpy as np
 import pandas as pd
 import pytest
 
 from avn.core.errors import UserError
-from avn.reporting.breakdown import breakdown, breakdown_figure
+from avn.reporting.breakdown import KINDS, breakdown, breakdown_figure
 
 
 def episodes() -> pd.DataFrame:
@@ -28,8 +29,7 @@ def test_groups_hold_their_own_episodes_in_order() -> None:
     table = breakdown(episodes(), "sight")
     assert table["group"].tolist() == ["in sight", "out of sight"]
     assert table["sr"].tolist() == pytest.approx([1, 1 / 3])
-    assert (table["sr_low"] <= table["sr"]).all()
-    assert (table["sr"] <= table["sr_high"]).all()
+    assert table["sr_low"].isna().all()  # of two and three sources
     table = breakdown(episodes(), "rooms")
     assert table["group"].tolist() == ["0", "1", "3 or more"]
     assert table["episodes"].tolist() == [2, 1, 2]
@@ -47,3 +47,26 @@ def test_runs_stand_side_by_side() -> None:
     rates = [box.lines[0].get_ydata().tolist() for box in first.containers]
     assert rates == [[100, 100, 100, 0], [0, 0, 0, 0]]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["one", "other"]
+
+
+def test_groups_and_counts_are_those_of_all_runs():
+    near = episodes().query("geodesic < 5")
+    far = pd.concat([episodes().query("geodesic > 5")] * 2)
+    figure = breakdown_figure({"near": near, "far": far}, caption="mini is for trying")
+    first, below = figure.axes[0], figure.axes[len(KINDS)]
+    labels = [text.get_text().replace("\n", " ") for text in below.get_xticklabels()]
+    assert labels == [
+        "0 to 2 0 to 1 episode per run",
+        "2 to 4 0 to 1 episode per run",
+        "4 to 6 0 to 2 episodes per run",
+        "10 or more 0 to 4 episodes per run",
+    ]
+    rates = [box.lines[0].get_ydata() for box in first.containers]
+    assert np.isnan(rates[0]).tolist() == [False, False, True, True]
+    assert np.isnan(rates[1]).tolist() == [True, True, False, False]
+    assert "mini is for trying" in figure.get_supxlabel()
+    alone = breakdown_figure({"far": far}).axes[len(KINDS)]
+    assert [text.get_text() for text in alone.get_xticklabels()] == [
+        "4 to 6\n2 episodes",
+        "10 or more\n4 episodes",
+    ]

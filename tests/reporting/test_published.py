@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
+from avn.reporting.paper import paper_table
 from avn.reporting.published import latex, markdown, published, terminal
 from avn.reporting.results import EPISODE_COLUMNS, summarise
-from avn.reporting.table import paper_table
 
 
 def episodes(seed: int, share: float, agent: str = "greedy") -> pd.DataFrame:
@@ -31,7 +31,7 @@ def episodes(seed: int, share: float, agent: str = "greedy") -> pd.DataFrame:
 @pytest.fixture
 def table():
     walked = pd.concat([episodes(0, 0.3), episodes(1, 0.5)])
-    return published(summarise(walked), walked), walked
+    return published(summarise(walked), walked, {"greedy": ["ring"]}), walked
 
 
 def test_cells_are_means_over_seeds_beside_the_papers_own(table):
@@ -107,3 +107,24 @@ def test_latex_escapes_names_and_has_as_many_cells_as_columns(table):
     lines = [line for line in text.splitlines() if "&" in line]
     assert {line.count("&") for line in lines} == {4}
     assert not re.search(r"\bnan\b", text, re.IGNORECASE)
+
+
+def test_the_papers_figures_stand_where_they_belong_alone():
+    walked = pd.concat([episodes(0, 0.3), episodes(1, 0.5)])
+    cells = published(summarise(walked), walked)
+    assert cells["paper_sr"].isna().all()
+    text = markdown(cells, ["ring", "a_b"], caption="protocol var with max_moves_ratio=3.0")
+    assert "paper" not in text
+    assert "Protocol var with max_moves_ratio=3.0." in text
+    own = published(summarise(walked), walked, {"greedy": ["ring"]})
+    assert set(own.loc[own["paper_sr"].notna(), "sound"]) == {"ring"}
+    assert "the results of the paper" in markdown(own, ["ring", "a_b"])
+
+
+def test_what_has_no_interval_is_said():
+    walked = episodes(0, 0.3).query("source < 2")
+    cells = published(summarise(walked), walked)
+    for text in (markdown(cells, ["ring", "a_b"]), latex(cells, ["ring", "a_b"], caption="a_b")):
+        assert "too few sources (fewer than 5) for an interval" in text
+        assert "[" not in text
+    assert r"\footnotesize a\_b" in latex(cells, ["ring", "a_b"], caption="a_b")

@@ -7,10 +7,12 @@ import pytest
 from avn.core.errors import UserError
 from avn.reporting.results import (
     EPISODE_COLUMNS,
+    INTERVALS,
     RESULT_COLUMNS,
     across_seeds,
     compare,
     headline,
+    shown_scenes,
     summarise,
     write_csv,
 )
@@ -19,7 +21,7 @@ from avn.reporting.results import (
 def episodes(
     agent: str = "greedy", seed: int = 0, sounds: tuple[str, ...] = ("ring", "alarm")
 ) -> pd.DataFrame:
-    """Records of two rooms with two sources; the second room has twice as many episodes."""
+    """Records of two rooms with five sources; the second room has twice as many episodes."""
     rng = np.random.default_rng([seed, *agent.encode()])
     rows = [
         {
@@ -36,8 +38,8 @@ def episodes(
             "source": source,
         }
         for sound in sounds
-        for room, count in (("room_1", 10), ("room_2", 20))
-        for source in range(2)
+        for room, count in (("room_1", 4), ("room_2", 8))
+        for source in range(5)
         for index in range(count)
     ]
     frame = pd.DataFrame(rows)
@@ -75,6 +77,26 @@ def test_figures_are_means_by_sound_and_room() -> None:
     for figure, column in (("sr", "success"), ("spl", "spl"), ("sna", "sna"), ("dtg", "dtg")):
         assert row[figure] == pytest.approx(own[column].mean())
         assert row[f"{figure}_low"] < row[figure] < row[f"{figure}_high"]
+
+
+def test_too_few_sources_have_no_interval() -> None:
+    frame = episodes()
+    few = summarise(frame[frame["source"] < 2])  # two sources in each room, four in all
+    assert few[list(INTERVALS)].isna().all(axis=None)
+    assert few["sr"].notna().all()
+    some = summarise(frame[frame["source"] < 3])
+    known = some["sr_low"].notna()
+    assert set(some.loc[known, "scene"]) == {"average"}
+    one = episodes("oracle")
+    other = compare(frame[frame["source"] < 2], one[one["source"] < 2])
+    assert other[["low", "high"]].isna().all(axis=None)
+    assert other["difference"].notna().all()
+
+
+def test_one_scene_has_no_average_of_its_own() -> None:
+    frame = episodes()
+    assert shown_scenes(summarise(frame)) == ["room_1", "room_2", "average"]
+    assert shown_scenes(summarise(frame[frame["scene"] == "room_2"])) == ["room_2"]
 
 
 def test_average_counts_every_room_the_same() -> None:

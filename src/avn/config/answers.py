@@ -2,7 +2,7 @@
 
 A record is found by all that the answer can depend on: the composed config and the command line,
 the files of the package, the sources of classes from outside, and the files that the config names.
-It holds the folder of the product and nothing of its content.
+It holds the folder of the product and the headings of its tables, and no result.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,24 @@ _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = ("folder", "source")
 
 
-def recall(command: str, cfg: DictConfig, marker: str) -> Path | None:
-    """Return the folder of a finished command's product, None where there is no record.
+@dataclass(frozen=True)
+class Answer:
+    """Product of a finished command.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder of the product.
+    shown : dict
+        Plain values that are printed with it, by name.
+    """
+
+    folder: Path
+    shown: dict[str, Any]
+
+
+def recall(command: str, cfg: DictConfig, marker: str) -> Answer | None:
+    """Return the product of a finished command, None where there is no record.
 
     Parameters
     ----------
@@ -40,14 +57,14 @@ def recall(command: str, cfg: DictConfig, marker: str) -> Path | None:
     """
     try:
         record = json.loads(_path(command, cfg).read_text())
-        folder = Path(cfg.outputs) / record["folder"]
+        answer = Answer(Path(cfg.outputs) / record["folder"], dict(record["shown"]))
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return folder if (folder / marker).is_file() else None
+    return answer if (answer.folder / marker).is_file() else None
 
 
-def remember(command: str, cfg: DictConfig, folder: Path) -> None:
-    """Record the folder of a finished command's product.
+def remember(command: str, cfg: DictConfig, folder: Path, shown: dict[str, Any]) -> None:
+    """Record the product of a finished command.
 
     Parameters
     ----------
@@ -57,8 +74,10 @@ def remember(command: str, cfg: DictConfig, folder: Path) -> None:
         Composed config.
     folder : Path
         Folder below `outputs`.
+    shown : dict
+        Plain values that are printed with it.
     """
-    record = {"folder": folder.relative_to(cfg.outputs).as_posix()}
+    record = {"folder": folder.relative_to(cfg.outputs).as_posix(), "shown": shown}
     with suppress(OSError), atomic_write(_path(command, cfg)) as part:  # may be read-only
         part.write_text(json.dumps(record))
 

@@ -6,6 +6,8 @@ It reads the package's config files and those of the user's folders (`--config-d
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,17 @@ def take_folders(arguments: list[str]) -> list[str]:
     rest, folders = without_folders(arguments)
     _folders[:] = map(str, folders)
     return rest
+
+
+@contextmanager
+def package_only() -> Iterator[None]:
+    """Leave the config folders of the command line out of what is composed in the block."""
+    folders = list(_folders)
+    _folders.clear()
+    try:
+        yield
+    finally:
+        _folders[:] = folders
 
 
 class OptionFiles(ConfigSource):

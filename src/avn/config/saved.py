@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import yaml
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 from omegaconf import DictConfig, OmegaConf
@@ -14,6 +15,12 @@ from avn.config import registry, schema
 from avn.config.folder import conf_folder
 from avn.config.signatures import is_option, with_signature
 from avn.core.errors import UserError
+
+# Errors of reading a file that is damaged, or of another version.
+_DAMAGE = (
+    *(OmegaConfBaseException, yaml.YAMLError, UserError),
+    *(OSError, ValueError, KeyError, IndexError),
+)
 
 
 def read_config(folder: Path) -> DictConfig:
@@ -31,7 +38,7 @@ def read_config(folder: Path) -> DictConfig:
         cfg = _typed(OmegaConf.load(path))
         if len(path.parents) > 4 and path.parents[3].name == "eval":
             cfg.outputs = str(path.parents[4])  # the outputs may have been moved since
-    except (OmegaConfBaseException, OSError, ValueError, KeyError, IndexError) as error:
+    except _DAMAGE as error:
         line = " ".join(str(error).split())
         raise UserError(f"{path}: not a config of this avn ({line}); run avn.eval again") from error
     return cfg

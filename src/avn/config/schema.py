@@ -182,6 +182,7 @@ class EvalConfig(CoreConfig):
     subset: str = MISSING
     film: int = MISSING
     film_show: str = MISSING
+    film_speed: float = MISSING
 
 
 @dataclass

@@ -31,6 +31,8 @@ def summarise(records: Iterable[Mapping[str, Any]], tell_folder: bool) -> None:
     if not len(summary):
         return
     _print(summary)
+    for note in dict.fromkeys(record["note"] for record in finished if record["note"]):
+        log(note)
     outputs = Path(finished[0]["outputs"])
     done = [Path(record["folder"]).relative_to(outputs).as_posix() for record in finished]
     path = stage_folder(outputs, "eval", "sweeps/sweep", digest(done)) / "results.csv"
@@ -58,4 +60,6 @@ def _print(summary: pd.DataFrame) -> None:
             for metric in ("sr", "spl")
         )
         labels = f"{row['agent']}, {row['sound']} ({row['setting'] or 'defaults'})"
-        log(f"{labels}, {row['seeds']} seeds: {metrics}")
+        labels += f", {row['protocol']}, {row['acoustics']}"
+        seeds = "1 seed" if row["seeds"] == 1 else f"{row['seeds']} seeds"
+        log(f"{labels}, {seeds}: {metrics}")

@@ -18,6 +18,8 @@ from typing import Any
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
+from avn.reporting.world import trial_note
+
 _RECORDS = "AVN_SWEEP_RECORDS"
 
 
@@ -50,6 +52,7 @@ def run_job(
         folder = task(cfg)
         record["folder"] = str(folder) if folder else None
         record["outputs"] = str(cfg.outputs)
+        record["note"] = trial_note((cfg.split.name, cfg.training.scenes.name))
     except Exception as error:
         line = explain(error)
         if line is None:

@@ -30,6 +30,7 @@ def fit(
     folder: Path,
     callbacks: Sequence[Callback] = (),
     accelerator: str = "auto",
+    run_name: str = "",
 ) -> dict[str, Any]:
     """Train a network in a folder, or resume an interrupted training.
 
@@ -50,6 +51,8 @@ def fit(
         Further callbacks, such as those that log figures to TensorBoard.
     accelerator : str
         Lightning's name of the device.
+    run_name : str
+        Folder of the TensorBoard events below `folder`, which names the run in TensorBoard.
 
     Returns
     -------
@@ -91,7 +94,7 @@ def fit(
             accelerator=accelerator,
             devices=1,
             max_epochs=model.hparams["epochs"],
-            logger=TensorBoardLogger(folder, name="", version="", default_hp_metric=False),
+            logger=TensorBoardLogger(folder, name=run_name, version="", default_hp_metric=False),
             callbacks=all_callbacks,
             num_sanity_val_steps=0,
             enable_progress_bar=False,

@@ -13,6 +13,7 @@ from avn.core.hashing import digest
 from avn.core.progress import format_duration, log
 from avn.core.settings import leaves, plain
 from avn.pipeline import replay
+from avn.pipeline.benchmark import note_of
 from avn.reporting.finished_run import read_run
 
 if TYPE_CHECKING:
@@ -22,12 +23,19 @@ FOLDER = "films"
 # Holds the fingerprint of the films of a folder.
 _MARK = ".made_from"
 MOST = 1000
+# Least and most steps per second.
+SPEEDS = (0.5, 10.0)
 
 
 def check(cfg: DictConfig) -> None:
-    """Refuse values of `film` and `film_show` that cannot work, before the run starts."""
+    """Refuse values of the settings of films that cannot work, before the run starts."""
     if not 0 <= cfg.film <= MOST:
         raise UserError(f"film: {cfg.film} is out of range; give how many, 0 to {MOST}")
+    if not SPEEDS[0] <= cfg.film_speed <= SPEEDS[1]:
+        raise UserError(
+            f"film_speed: {cfg.film_speed:g} is out of range; give steps per second, "
+            f"{SPEEDS[0]:g} to {SPEEDS[1]:g}"
+        )
     if cfg.film_show not in replay.SHOWS:
         raise UserError(f"film_show: '{cfg.film_show}' is none of {', '.join(replay.SHOWS)}")
 
@@ -44,7 +52,7 @@ def read(cfg: DictConfig) -> set[str]:
     return leaves(cfg, ["microphone"]).union(*(stage.read() for stage in stages))
 
 
-def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
+def make_films(cfg: DictConfig, folder: Path, default: DictConfig) -> list[Path]:
     """Write up to `film` films of a finished run.
 
     Existing films are kept unless views or microphone have changed.
@@ -52,9 +60,12 @@ def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
     Parameters
     ----------
     cfg : DictConfig
-        Config of `avn.eval`: `film` is the number of films, `film_show` selects episodes.
+        Config of `avn.eval`: `film` is the number of films, `film_show` selects episodes, and
+        `film_speed` is the number of steps per second.
     folder : Path
         Folder of the run.
+    default : DictConfig
+        Config of its row and options; see `avn.config.defaults.default_config`.
 
     Returns
     -------
@@ -65,7 +76,7 @@ def make_films(cfg: DictConfig, folder: Path) -> list[Path]:
 
     if not cfg.film:
         return []
-    run = Run(folder, cfg, *read_run(folder))
+    run = Run(folder, cfg, *read_run(folder), default)
     labels = replay.choose(run.episodes, cfg.film_show, cfg.film)
     if not labels:
         log(f"film_show: the run has no episode that is a {cfg.film_show}")
@@ -105,10 +116,12 @@ def _fingerprint(cfg: DictConfig) -> str:
 def _name(run: Run, label: int) -> str:
     row = run.episodes.loc[label]
     check_name("sound", str(row["sound"]))
-    return f"{row['scene']}-{row['sound']}-{row['episode']}-{row['outcome']}.mp4"
+    speed = "" if run.cfg.film_speed == 1 else f"-speed{run.cfg.film_speed:g}"
+    return f"{row['scene']}-{row['sound']}-{row['episode']}-{row['outcome']}{speed}.mp4"
 
 
 def _write(run: Run, paths: dict[int, Path]) -> None:
+
     from avn.pipeline.observed import RunObservations, soundtrack
     from avn.reporting.film import write_film
 
@@ -116,4 +129,8 @@ def _write(run: Run, paths: dict[int, Path]) -> None:
     for trace, path in zip(replay.traces(run, list(paths)), paths.values(), strict=True):
         clips = observations.clips(trace)
         views = observations.views(trace.scene.name, trace.state)
-        write_film(path, trace, str(run.cfg.agent.name), views, clips, soundtrack(clips))
+        write_film(
+            *(path, trace, str(run.cfg.agent.name), views, clips, soundtrack(clips)),
+            speed=run.cfg.film_speed,
+            note=note_of(run.cfg),
+        )

@@ -75,6 +75,18 @@ class Policy(Trained):
         """Name of the row, which names the folder."""
         return str(self.cfg.agent.name)
 
+    @property
+    def seed(self) -> int:
+        """Seed of the training."""
+        return int(self.cfg.algorithm.train_seed)
+
+    @property
+    def monitor(self) -> str:
+        """Metric by which the best round is chosen."""
+        from avn.rl.training import MONITOR
+
+        return MONITOR
+
     def check(self) -> None:
         """Refuse an agent that does not learn, and recipes that cannot work."""
         if not learns(self.cfg):
@@ -211,7 +223,9 @@ def _train(policy: Policy) -> None:
         top=cfg.baseline.top,
     )
     measure = Measure(cfg, opened, protocol)
-    curve = Training(spec, network, policy.folder, measure, policy.fingerprint).run()
+    curve = Training(
+        spec, network, policy.folder, measure, policy.fingerprint, policy.run_name
+    ).run()
     best = max(curve, key=lambda point: point[MONITOR])
     if best is curve[0]:
         log(
@@ -270,17 +284,17 @@ class Measure:
         agent = actor_critic(self._cfg, network)
         agent.samples = True  # the best network does not depend on how it acts later
         for subset, (scenes, observations) in self._observed.items():
-            # `train/` names the metrics of the training steps
-            name = "training" if subset == "train" else subset
             records = pd.concat(
                 rollout_scene(
                     agent, scene, self._episodes(scene), self._protocol, self._labels, observed
                 )
                 for scene, observed in zip(scenes, observations, strict=True)
             )
-            metrics[f"{name}/return"] = float(_returns(records, self._cfg.algorithm.reward).mean())
-            metrics[f"{name}/success"] = float(records["success"].mean())
-            metrics[f"{name}/spl"] = float(records["spl"].mean())
+            metrics[f"{subset}/return"] = float(
+                _returns(records, self._cfg.algorithm.reward).mean()
+            )
+            metrics[f"{subset}/success"] = float(records["success"].mean())
+            metrics[f"{subset}/spl"] = float(records["spl"].mean())
         return metrics
 
     def _episodes(self, scene: Scene) -> Any:

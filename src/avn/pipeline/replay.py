@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +25,14 @@ from avn.navigation.trace import Trace
 from avn.pipeline.recordings import has_recordings, with_recordings
 from avn.pipeline.run import Evaluation, rollout_scenes
 from avn.pipeline.sounds import sound_files, sounds_content
-from avn.pipeline.stage import MACHINE, build
+from avn.pipeline.stage import build
 from avn.reporting.finished_run import read_run
 
-# Settings that name a run where it differs in them from the others.
-_TELLING = ("protocol", "acoustics", "look", "localisation", "exploration", "seed", "train_seed")
 _OTHER = (
     "it was made with other code, networks or classes of your own; run avn.eval again and give the "
     "folder that it prints"
 )
+_START = ("source", "start_cell", "start_heading")
 SHOWS = ("typical", "success", "failure")
 
 
@@ -48,15 +48,18 @@ class Run:
         Config of the run.
     results, episodes : DataFrame
         `results.csv` and `episodes.csv`.
+    default : DictConfig
+        Config of its row and options without changes; see `avn.config.defaults.default_config`.
     """
 
     folder: Path
     cfg: DictConfig
     results: pd.DataFrame
     episodes: pd.DataFrame
+    default: DictConfig
     _scenes: list[Scene] = field(default_factory=list)
 
-    @property
+    @cached_property
     def settings(self) -> dict[str, str]:
         """Settings that the run reads, as dotted keys and texts; sounds as hashes of recordings."""
         read = sorted(Evaluation(self.cfg).read() - leaves(self.cfg, ["sound"]))
@@ -73,7 +76,7 @@ class Run:
         return self._scenes
 
 
-def open_run(folder: Path, cfg: DictConfig) -> Run:
+def open_run(folder: Path, cfg: DictConfig, default: DictConfig) -> Run:
     """Read a finished run from its folder.
 
     Parameters
@@ -82,6 +85,8 @@ def open_run(folder: Path, cfg: DictConfig) -> Run:
         `outputs/eval/<agent>/<sounds>/<run>`.
     cfg : DictConfig
         Its config; see `avn.config.saved.read_config`.
+    default : DictConfig
+        Config of its row and options; see `avn.config.defaults.default_config`.
 
     Raises
     ------
@@ -93,7 +98,7 @@ def open_run(folder: Path, cfg: DictConfig) -> Run:
         cfg = with_recordings(cfg, folder)
     elif not set(sound_files(cfg).values()) <= {*BUILTIN} and not _is_of(folder, cfg):
         raise UserError(f"{folder}: its recordings have changed, or {_OTHER}")
-    return Run(folder, cfg, *records)
+    return Run(folder, cfg, *records, default)
 
 
 def _is_of(folder: Path, cfg: DictConfig) -> bool:
@@ -112,7 +117,7 @@ def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
         All episodes, successes or failures, ranked by their distance to the median of the group:
         of the SPL, for failures of the final distance to the goal.
     count : int
-        Maximum number of episodes; they are spread over scenes and sounds.
+        Maximum number of episodes; they are spread over scenes and sounds, and over starts.
 
     Returns
     -------
@@ -134,6 +139,9 @@ def choose(episodes: pd.DataFrame, show: str, count: int) -> list[int]:
     ranked["round"] = ranked.groupby(["scene", "sound"]).cumcount()
     ranked["scene_round"] = ranked.groupby(["round", "scene"]).cumcount()
     ranked = ranked.sort_values(["round", "scene_round", "off", "far"], kind="stable")
+    # the same start with another sound comes after all other starts
+    ranked["again"] = ranked.groupby(["scene", *_START]).cumcount()
+    ranked = ranked.sort_values("again", kind="stable")
     return [int(label) for label in ranked.index[:count]]
 
 
@@ -168,41 +176,6 @@ def episode_keys(episodes: pd.DataFrame) -> list[tuple[Any, ...]]:
     """Return the identity of each record's episode, independent of the agent."""
     keys = ["scene", "sound", "seed", "episode", "source_cell", "start_cell", "start_heading"]
     return [tuple(row) for row in episodes[keys].itertuples(index=False)]
-
-
-def names_of(runs: Sequence[Run]) -> list[str]:
-    """Return distinct names of runs: the agent and the settings in which they differ."""
-    settings = [run.settings for run in runs]
-    keys = [key for read in settings for key in read]
-    keys = [key for key in dict.fromkeys(keys) if len(_values(key, settings)) > 1]
-    shown = {key: label for key in keys if (label := _label(key))}
-    names = []
-    for run, read in zip(runs, settings, strict=True):
-        parts = dict.fromkeys(f"{shown[key]}={read[key]}" for key in shown if key in read)
-        names.append(", ".join((str(run.cfg.agent.name), *parts)))
-    if len(set(names)) < len(names):  # they differ in settings of networks or scenes
-        names = [f"{name} ({run.folder.name})" for name, run in zip(names, runs, strict=True)]
-    return names
-
-
-def settings_but_seed(run: Run) -> str:
-    """Return all settings of a run that change its records, without the seed of its episodes."""
-    others = ("seed", *MACHINE, "film", "film_show")
-    return repr([(key, value) for key, value in run.settings.items() if key not in others])
-
-
-def _label(key: str) -> str:
-    """Return the label of a setting in a run's name; empty where it is not shown."""
-    first, last = key.split(".")[0], key.rsplit(".", 1)[-1]
-    if first in _TELLING:
-        return key.removesuffix(".name")
-    # a saved config holds what `look` and the like were resolved to
-    return last if last in ("look", "localisation", "train_seed") else ""
-
-
-def _values(key: str, settings: Sequence[Mapping[str, str]]) -> set[str]:
-    """Return the values of a setting among the runs that read it."""
-    return {read[key] for read in settings if key in read}
 
 
 def traces(run: Run, labels: Sequence[int], beliefs: bool = True) -> list[Trace]:

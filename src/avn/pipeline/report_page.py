@@ -15,8 +15,10 @@ from avn.core.hashing import digest
 from avn.core.progress import log
 from avn.navigation.trace import Trace
 from avn.pipeline import replay
+from avn.pipeline.benchmark import changed_settings, describe_world, note_of, paper_sounds
 from avn.pipeline.observed import RunObservations, soundtrack
 from avn.pipeline.replay import Run
+from avn.pipeline.run_names import names_of, settings_but_seed
 from avn.reporting import page, page_media
 from avn.reporting.results import across_seeds, summarise
 
@@ -76,7 +78,7 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
     paths : bool
         Whether the paths of all other episodes are embedded too.
     """
-    names = replay.names_of(runs)
+    names = names_of(runs)
     groups = _seed_groups(runs)
     within = {index for group in groups for index in group}
     media = _Media()
@@ -97,6 +99,8 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
                 media=embedded,
                 paths=walked_paths,
                 within=index in within,
+                world=describe_world(run.cfg, run.default),
+                paper=paper_sounds(run.cfg, run.default),
             )
         )
     together = [_together([runs[i] for i in group], [pages[i] for i in group]) for group in groups]
@@ -107,6 +111,7 @@ def build(runs: Sequence[Run], count: int, show: str, paths: bool = False) -> st
         media.plans,
         media.views,
         media.with_twins(),
+        note=next(filter(None, (note_of(run.cfg) for run in runs)), ""),
     )
 
 
@@ -114,7 +119,9 @@ def _seed_groups(runs: Sequence[Run]) -> list[list[int]]:
     """Return groups of indices of runs that differ in their seed only, of two runs or more."""
     groups: dict[str, list[int]] = {}
     for index, run in enumerate(runs):
-        groups.setdefault(replay.settings_but_seed(run), []).append(index)
+        group = groups.setdefault(settings_but_seed(run), [])
+        if run.cfg.seed not in [runs[other].cfg.seed for other in group]:  # a copy counts once
+            group.append(index)
     return [group for group in groups.values() if len(group) > 1]
 
 
@@ -138,6 +145,8 @@ def _together(runs: Sequence[Run], pages: Sequence[page.PageRun]) -> page.PageRu
         episodes=episodes,
         media=media,
         paths=[path for one in pages for path in one.paths or []] or None,
+        world=pages[0].world,
+        paper=frozenset.intersection(*(frozenset(one.paper) for one in pages)),
         seeds=across_seeds(pd.concat([one.results for one in pages])),
     )
 
@@ -157,13 +166,15 @@ def _chosen(runs: Sequence[Run], count: int, show: str) -> Iterator[list[int]]:
 
 
 def _settings(run: Run) -> str:
-    cfg = run.cfg
-    parts = {key: cfg[key].name for key in ("protocol", "acoustics", "split", "mapper", "planner")}
-    parts |= {
-        key: cfg[key] for key in ("look", "exploration", "localisation", "subset", "episodes")
-    }
-    parts["train_seed"] = cfg.train_seed
-    return ", ".join(f"{key}={value}" for key, value in parts.items())
+    """Describe the parts of a run's agent and what was changed in them, without its world."""
+    read = {key.split(".")[0] for key in run.settings}
+    parts = [group for group in ("sound_model", "mapper", "planner") if group in read]
+    texts = [f"{group}={run.cfg[group].name}" for group in parts]
+    changed = changed_settings(run.cfg, run.default)
+    texts += [f"{key}={value}" for key, value in changed.items() if not key.endswith(".name")]
+    seeds = {key.rsplit(".", 1)[-1] for key in run.settings}
+    texts += [f"{key}={run.cfg[key]}" for key in ("seed", "train_seed") if key in seeds]
+    return ", ".join(texts)
 
 
 class _Media:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -14,13 +14,14 @@ from avn.core.errors import UserError
 from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest
 from avn.core.progress import format_duration, log
+from avn.pipeline.benchmark import caption_of, paper_sounds_by_agent
 from avn.pipeline.dashboard import Dashboard
 from avn.pipeline.run import Evaluation, agent_label
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stage import announce, discard_if_forced, make, missing, timings
 from avn.reporting import published, results, table
 from avn.reporting.finished_run import RESULTS, read_run
-from avn.reporting.table import PAPER_PROTOCOL
+from avn.reporting.paper import paper_averages
 
 # Files beside `results.csv`.
 ACROSS, CELLS, TABLE, LATEX, SECONDS = (
@@ -32,7 +33,7 @@ ACROSS, CELLS, TABLE, LATEX, SECONDS = (
 )
 
 
-def reproduce(cfg: DictConfig, rows: Sequence[DictConfig]) -> Path:
+def reproduce(cfg: DictConfig, rows: Sequence[DictConfig], defaults: Sequence[DictConfig]) -> Path:
     """Build what is missing, evaluate each row with each seed, and print the table.
 
     Parameters
@@ -41,6 +42,8 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig]) -> Path:
         Config of `avn.reproduce`.
     rows : sequence of DictConfig
         Config of each row, as of `avn.eval`.
+    defaults : sequence of DictConfig
+        Config of each row without changes; see `avn.config.defaults.default_config`.
 
     Returns
     -------
@@ -56,15 +59,24 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig]) -> Path:
         if not cfg[key]:
             raise UserError(f"{key}: empty; give at least one, such as rows=greedy seeds=0")
     configs = [config for row in rows for config in _runs(cfg, row)]
-    folders = _make_runs(configs)
+    paper = paper_sounds_by_agent(rows, defaults)
+    folders = _make_runs(configs, paper)
     tables, episodes = zip(*map(read_run, folders), strict=True)
     runs, records = pd.concat(tables), pd.concat(episodes)
     privileged = {agent_label(config) for config in configs if config.agent.privileged}
-    cells = published.published(runs, records)
-    for shown in (published.terminal(cells, privileged), table.hardness_table(episodes[0])):
-        table.wide_console().print(shown)
+    cells = published.published(runs, records, paper)
+    caption = _caption(rows, defaults)
+    table.print_table(published.terminal(cells, privileged), caption)
+    if legend := published.legend(cells):
+        table.wide_console().print(legend)
+    table.print_table(table.hardness_table(episodes[0]), caption)
+    sounds = list(sound_files(configs[0]))
     target = stage_folder(cfg.outputs, "reproduce", "table", digest([f.name for f in folders]))
-    _write(target, runs, cells, list(sound_files(configs[0])), privileged)
+    files = (
+        (TABLE, published.markdown(cells, sounds, privileged, caption)),
+        (LATEX, published.latex(cells, sounds, privileged, caption)),
+    )
+    _write(target, runs, cells, files)
     _compare(records)
     return target
 
@@ -75,17 +87,26 @@ def settings_of(rows: Sequence[DictConfig]) -> set[str]:
     return keys.union(*(Evaluation(row).read() for row in rows))
 
 
-def _make_runs(configs: Sequence[DictConfig]) -> list[Path]:
-    """Make all runs and what they need; print the plan first and each row when it is finished."""
+def _caption(rows: Sequence[DictConfig], defaults: Sequence[DictConfig]) -> str:
+    """Return the world of the rows, as the row that reads most settings has it."""
+    pairs = list(zip(rows, defaults, strict=True))
+    return caption_of(*max(pairs, key=lambda pair: len(Evaluation(pair[0]).read())))
+
+
+def _make_runs(configs: Sequence[DictConfig], paper: Mapping[str, Collection[str]]) -> list[Path]:
+    """Make all runs and what they need; print the plan first and each row when it is finished.
+
+    `paper` holds the sounds by agent beside which the paper's results stand.
+    """
     runs = [Evaluation(cfg) for cfg in configs]
     for run in runs:
         run.check()
     discard_if_forced(runs)
     steps = missing(runs)
     announce(steps, {run.fingerprint for run in runs})
-    paper = published.paper_averages() if configs[0].protocol.name == PAPER_PROTOCOL else {}
+    averages = {row: f"{sr:.1f} / {spl:.1f}" for row, (sr, spl) in paper_averages(paper).items()}
     rows = dict.fromkeys(cfg.agent.name for cfg in configs)
-    with Dashboard([(s.title, s.expected()) for s in steps], list(rows), paper) as board:
+    with Dashboard([(s.title, s.expected()) for s in steps], list(rows), averages) as board:
         table = _Rows(runs, board)
         table.fill()
         for stage in steps:
@@ -140,22 +161,19 @@ def _runs(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:
 
 
 def _write(
-    target: Path, runs: pd.DataFrame, cells: pd.DataFrame, sounds: list[str], privileged: set[str]
+    target: Path, runs: pd.DataFrame, cells: pd.DataFrame, files: Sequence[tuple[str, str]]
 ) -> None:
-    """Write the table as CSV, Markdown and LaTeX, and the durations of the stages."""
+    """Write the table as CSV and as texts by file name, and the durations of the stages."""
     results.write_csv(runs, target / RESULTS)
     results.write_csv(results.across_seeds(runs), target / ACROSS)
     results.write_csv(cells, target / CELLS)
-    for name, text in (
-        (TABLE, published.markdown(cells, sounds, privileged)),
-        (LATEX, published.latex(cells, sounds, privileged)),
-    ):
+    for name, text in files:
         with atomic_write(target / name) as part:
             part.write_text(text, encoding="utf-8")
     seconds = pd.DataFrame({"stage": list(timings), "seconds": list(timings.values())})
     if len(seconds):  # where nothing was made, the earlier durations stay
-        seconds = seconds.sort_values("seconds", ascending=False).round(1)
-        results.write_csv(seconds, target / SECONDS)
+        seconds = seconds.sort_values("seconds", ascending=False)
+        results.write_csv(seconds.round(1), target / SECONDS)
         for row in seconds.itertuples():
             log(f"{row.seconds:7.0f} s  {row.stage}")
 
@@ -169,7 +187,7 @@ def _compare(episodes: pd.DataFrame) -> None:
     for one, other in zip(rows[1:], rows, strict=False):
         differences = results.compare(mean[mean["agent"] == one], mean[mean["agent"] == other])
         spl = differences.set_index("metric").loc["spl"] * 100
-        log(
-            f"{one} less {other}: SPL {spl['difference']:+.1f} points "
-            f"(95 % interval {spl['low']:+.1f} to {spl['high']:+.1f})"
-        )
+        interval = f"95 % interval {spl['low']:+.1f} to {spl['high']:+.1f}"
+        if spl.isna().any():
+            interval = results.NO_INTERVAL
+        log(f"{one} less {other}: SPL {spl['difference']:+.1f} points ({interval})")

@@ -34,6 +34,7 @@ from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import learns
 from avn.pipeline.recordings import keep_recordings
+from avn.pipeline.run_events import write_events
 from avn.pipeline.scenes import Geometry
 from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
 from avn.pipeline.stage import Stage
@@ -110,7 +111,7 @@ class Evaluation(Stage):
 
     def consulted(self) -> Sequence[str]:
         """Return the keys of the subset, of the sounds and of films of a finished run."""
-        return ("subset", "sound", "film", "film_show")
+        return ("subset", "sound", "film", "film_show", "film_speed")
 
     def content(self) -> Any:
         """Return the hashes of the recordings."""
@@ -181,7 +182,7 @@ class Evaluation(Stage):
         walks = [episodes_of(cfg, scene, protocol).trajectories for scene in scenes]
         perception_tables.write(self.observed, scenes, walks, observations, folder)
         summary = results.summarise(episodes)
-        _log(cfg, folder, summary)
+        write_events(cfg, folder, episodes, summary, self.read())
         with atomic_write(folder / "config.yaml") as part:
             OmegaConf.save(cfg, part, resolve=True)
         keep_recordings(cfg, folder)
@@ -261,23 +262,3 @@ def episodes_of(cfg: DictConfig, scene: Scene, protocol: Protocol) -> Episodes:
     if cfg.episodes == "exhaustive":
         return exhaustive_episodes(scene, sounds, protocol, cfg.seed)
     return frozen_episodes(scene, sounds, protocol, cfg.seed, cfg.exploration)
-
-
-def _log(cfg: DictConfig, folder: Path, summary: pd.DataFrame) -> None:
-    """Write TensorBoard scalars by scene and sound, and hparams with SR and SPL."""
-    from torch.utils.tensorboard import SummaryWriter
-
-    settings = {key: cfg[key].name for key in ("agent", "protocol", "acoustics", "split")}
-    settings |= {key: cfg[key].name for key in ("sound_model", "mapper", "planner")}
-    settings |= {"seed": cfg.seed, "train_seed": cfg.train_seed, "episodes": cfg.episodes}
-    settings |= {key: cfg[key] for key in ("look", "exploration", "localisation")}
-    settings |= {"subset": cfg.subset}
-    if "source" in cfg.planner:
-        settings["source_filter"] = cfg.planner.source_filter
-    settings["sounds"] = "-".join(sound_files(cfg))
-    metrics = results.headline(summary)
-    with SummaryWriter(str(folder)) as writer:
-        for row in summary.itertuples():
-            for name in metrics:
-                writer.add_scalar(f"{name}/{row.sound}/{row.scene}", getattr(row, name), cfg.seed)
-        writer.add_hparams(settings, metrics, run_name=".")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -10,16 +11,21 @@ from torch.utils.tensorboard import SummaryWriter
 
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
+from avn.core.hashing import digest
 from avn.core.progress import log
 from avn.navigation.trace import Trace
 from avn.pipeline import replay
+from avn.pipeline.benchmark import caption_of
 from avn.pipeline.replay import Run
+from avn.pipeline.run_names import names_of
 from avn.reporting.belief_figures import belief_figure, memory_figure
 from avn.reporting.breakdown import breakdown_figure
 from avn.reporting.trajectory_figures import estimate_figure, trajectory_figure
 
 FOLDER = "figures"
 _SUFFIX = ".figures"
+# Letters of the name of a selection.
+_LONGEST = 40
 
 
 def draw_runs(runs: Sequence[Run], show: str, count: int, episodes: Sequence[int] | None) -> None:
@@ -45,19 +51,31 @@ def draw_runs(runs: Sequence[Run], show: str, count: int, episodes: Sequence[int
     labels = list(episodes or replay.choose(first.episodes, show, count))
     if unknown := set(labels) - set(first.episodes.index):
         raise UserError(f"--episode: {first.folder} has no row {min(unknown)} in episodes.csv")
-    names = replay.names_of(runs)
-    made = {
-        "breakdown": breakdown_figure(dict(zip(names, (r.episodes for r in runs), strict=True)))
-    }
+    names = names_of(runs)
+    caption = caption_of(first.cfg, first.default)
+    records = dict(zip(names, (run.episodes for run in runs), strict=True))
+    made = {"breakdown": breakdown_figure(records, caption=caption)}
     if labels:
         traces = [replay.traces(run, replay.same_episodes(first, labels, run)) for run in runs]
-        made |= episode_figures(traces, names)
+        made |= episode_figures(traces, names, caption)
     else:
         log(f"{first.folder}: no episode to show (--show {show})")
-    write_figures(first.folder, made)
+    chosen = f"rows-{'-'.join(map(str, episodes))}" if episodes else f"{show}-{count}"
+    write_figures(first.folder, _selection(chosen, runs), made)
 
 
-def episode_figures(traces: Sequence[Sequence[Trace]], names: Sequence[str]) -> dict[str, Figure]:
+def _selection(chosen: str, runs: Sequence[Run]) -> str:
+    """Name the choice of episodes and the other runs, so that each call has its own folder."""
+    name = chosen if len(chosen) <= _LONGEST else f"{chosen[:_LONGEST]}-{digest(chosen)[:8]}"
+    others = [f"{run.cfg.agent.name}-{run.folder.name}" for run in runs[1:]]
+    if len(others) > 1:
+        others = [f"{len(others)}-runs-{digest(others)[:8]}"]
+    return "-with-".join((name, *others))
+
+
+def episode_figures(
+    traces: Sequence[Sequence[Trace]], names: Sequence[str], caption: str = ""
+) -> dict[str, Figure]:
     """Draw the figures of episodes of several runs.
 
     Parameters
@@ -66,14 +84,16 @@ def episode_figures(traces: Sequence[Sequence[Trace]], names: Sequence[str]) -> 
         Traces of the same episodes, by run.
     names : sequence of str
         Names of the runs.
+    caption : str
+        World of the runs, below each figure.
 
     Returns
     -------
     dict of str to Figure
         Figures by name; those of one episode are of the first run.
     """
-    made = {"trajectories": trajectory_figure(list(zip(*traces, strict=True)), names)}
-    kinds: tuple[tuple[str, Callable[[Trace, str], Figure]], ...] = (
+    made = {"trajectories": trajectory_figure(list(zip(*traces, strict=True)), names, caption)}
+    kinds: tuple[tuple[str, Callable[[Trace, str, str], Figure]], ...] = (
         ("estimates", estimate_figure),
         ("belief", belief_figure),
         ("memory", memory_figure),
@@ -82,21 +102,32 @@ def episode_figures(traces: Sequence[Sequence[Trace]], names: Sequence[str]) -> 
         record = trace.record
         for kind, draw in kinds:
             try:
-                figure = draw(trace, names[0])
+                figure = draw(trace, names[0], caption)
             except ValueError:
                 continue  # an agent without this part
             made[f"{kind}-{record['scene']}-{record['sound']}-{record['episode']}"] = figure
     return made
 
 
-def write_figures(folder: Path, made: dict[str, Figure]) -> None:
-    """Write figures to a run's folder and TensorBoard; older ones are replaced."""
-    for old in folder.glob(f"events.*{_SUFFIX}"):
+def write_figures(folder: Path, selection: str, made: dict[str, Figure]) -> None:
+    """Write figures to a run's folder and TensorBoard; those of the same selection are replaced.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+    selection : str
+        Name of the folder below `figures`.
+    made : dict of str to Figure
+        Figures by name.
+    """
+    suffix = f".{selection}{_SUFFIX}"
+    for old in folder.glob(f"events.*{glob.escape(suffix)}"):
         old.unlink()
-    with SummaryWriter(str(folder), filename_suffix=_SUFFIX) as writer:
+    with SummaryWriter(str(folder), filename_suffix=suffix) as writer:
         for name, figure in made.items():
-            path = folder / FOLDER / f"{name}.png"
+            path = folder / FOLDER / selection / f"{name}.png"
             with atomic_write(path) as part:
                 figure.savefig(part, format="png", metadata={"Software": None})
             log(str(path))
-            writer.add_figure(f"figures/{name.replace('-', '/', 1)}", figure)
+            writer.add_figure(f"figures/{selection}/{name.replace('-', '/', 1)}", figure)

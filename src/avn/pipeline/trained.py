@@ -14,6 +14,7 @@ from avn.core.hashing import file_hash
 from avn.modules.settings import BEST, LAST
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.stage import Stage
+from avn.reporting.events import write_summary
 from avn.reporting.model_card import write_card
 
 if TYPE_CHECKING:
@@ -73,9 +74,46 @@ class Trained(Stage):
     def finish(self, metrics: dict[str, Any], recipe: dict[str, Any]) -> None:
         """Write the model card and `metrics.json`, which marks the training as finished."""
         metrics = metrics | {CHECKSUM: file_hash(self.folder / BEST)}
+        self._write_events(metrics)
         write_card(self.folder, self.title, self._setting(), recipe, metrics)
         with atomic_write(self.folder / METRICS) as part:
             part.write_text(json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+        self._write_events(metrics)
+
+    @property
+    def seed(self) -> int:
+        """Seed of the training."""
+        return int(self.cfg.train_seed)
+
+    @property
+    def run_name(self) -> str:
+        """Name of the training in TensorBoard: model, world, sounds of the training and seed."""
+        parts = [self.name, *self._world().values(), f"seed{self.seed}"]
+        return "-".join(str(part).replace("/", "_") for part in parts)
+
+    def _world(self) -> dict[str, str]:
+        """Return the parts of the training world that the network depends on."""
+        read = {key.rsplit(".", 1)[0] for key in self.read()}
+        world = {}
+        if TRAINING.acoustics in read:
+            world["acoustics"] = str(self.train.node("acoustics").name)
+        world["split"] = str(self.train.node("split").name)
+        if TRAINING.sounds in read:
+            world["sounds_in_training"] = "+".join(map(str, self.train.node("sounds")))
+        return world
+
+    def _write_events(self, metrics: dict[str, Any]) -> None:
+        """Write the row of the training in the HPARAMS tab of TensorBoard."""
+        settings = {"kind": "training", "agent": self.name, "train_seed": self.seed}
+        best = metrics.get(self.monitor, metrics.get(f"best/{self.monitor}"))
+        found = {} if best is None else {"best_validation": float(best)}
+        folder = self.folder / self.run_name
+        write_summary(folder, settings | self._world(), found, {}, suffix=".hparams")
+
+    @property
+    def monitor(self) -> str:
+        """Metric by which the best epoch or round is chosen."""
+        return ""
 
     def check_weights(self) -> None:
         """Raise `UserError` where the best checkpoint has changed since the training."""
@@ -106,6 +144,11 @@ class Fitted(Trained):
     def data(self) -> L.LightningDataModule:
         """Return the data module."""
 
+    @property
+    def monitor(self) -> str:
+        """Metric by which the best epoch is chosen."""
+        return str(self.untrained().monitor)
+
     def check(self) -> None:
         """Refuse an invalid recipe."""
         self.untrained()
@@ -124,7 +167,7 @@ class Fitted(Trained):
 
         model = self.untrained()
         data = self.data()
-        metrics = training.fit(data, model, self.folder, self.callbacks())
+        metrics = training.fit(data, model, self.folder, self.callbacks(), run_name=self.run_name)
         self.finish(metrics | self.measure(model, data), dict(model.hparams))
 
     def load(self) -> Any:

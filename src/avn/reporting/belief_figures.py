@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from avn.core.actions import HEADINGS
 from avn.navigation.trace import BeliefTrace, Trace
@@ -18,18 +19,30 @@ from avn.reporting.trajectory_figures import (
     draw_walk,
     extent,
     figure_of,
+    marker_handles,
     outcome,
     plan_of,
     title_of,
+    wrapped,
 )
 
 PANELS = 6
+_STAR: dict[str, Any] = {"color": "#ffb000", "mec": "black", "mew": 0.8}
 # Colour of the path, distinct from all colours of the belief.
 WALKED = "#e0218a"
 
 
-def belief_figure(trace: Trace, name: str) -> Figure:
+def belief_figure(trace: Trace, name: str, caption: str = "") -> Figure:
     """Draw the occupancy belief at some steps from the first to the last.
+
+    Parameters
+    ----------
+    trace : Trace
+        The episode.
+    name : str
+        Name of the run.
+    caption : str
+        World of the run, below the figure.
 
     Raises
     ------
@@ -40,7 +53,7 @@ def belief_figure(trace: Trace, name: str) -> Figure:
     if beliefs is None or beliefs.free is None or not len(trace.action):
         raise ValueError("this agent has no map of free squares")
     steps = np.unique(np.linspace(0, len(trace.action) - 1, PANELS).round().astype(int))
-    figure = figure_of(11.5, 3.3 * -(-len(steps) // 3) + 0.6)
+    figure = figure_of(11.5, 3.3 * -(-len(steps) // 3) + 1.0, caption)
     panels = figure.subplots(-(-len(steps) // 3), 3, squeeze=False).reshape(-1)
     for axes in panels[len(steps) :]:
         axes.set_visible(False)
@@ -49,8 +62,29 @@ def belief_figure(trace: Trace, name: str) -> Figure:
         axes.set_title(f"before action {step + 1}", fontsize=9)
     bar = figure.colorbar(image, ax=list(panels), fraction=0.025, pad=0.01)
     bar.set_label("belief that a square is free")
-    figure.suptitle(f"{name}: {title_of(trace)}; {outcome(trace)}", fontsize=10)
+    figure.suptitle(wrapped(f"{name}: {title_of(trace)}; {outcome(trace)}", 110), fontsize=10)
+    figure.legend(
+        handles=_belief_handles(trace.source_estimates is not None),
+        loc="outside lower left",
+        ncols=4,
+        frameon=False,
+        fontsize=9,
+    )
     return figure
+
+
+def _belief_handles(estimate: bool) -> list[Line2D]:
+    """Return the legend of the marks on a belief."""
+    ring: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": WALKED, "mew": 2, "markersize": 7}
+    handles = [
+        Line2D([], [], color=WALKED, lw=2, label="path so far"),
+        Line2D([], [], color=WALKED, lw=2, label="agent, line to its front", **ring),
+        Line2D([], [], linestyle="none", marker="*", markersize=12, label="source", **_STAR),
+    ]
+    if estimate:
+        cross: dict[str, Any] = {"marker": "P", "color": "#1f6fb2", "mec": "white", "markersize": 9}
+        handles.append(Line2D([], [], linestyle="none", label="source estimate", **cross))
+    return handles
 
 
 def draw_belief(axes: Axes, trace: Trace, beliefs: BeliefTrace, step: int) -> Any:
@@ -100,8 +134,17 @@ def draw_belief(axes: Axes, trace: Trace, beliefs: BeliefTrace, step: int) -> An
     return image
 
 
-def memory_figure(trace: Trace, name: str) -> Figure:
+def memory_figure(trace: Trace, name: str, caption: str = "") -> Figure:
     """Draw the exploration walk in an agent's memory, its retrievals, and their errors.
+
+    Parameters
+    ----------
+    trace : Trace
+        The episode.
+    name : str
+        Name of the run.
+    caption : str
+        World of the run, below the figure.
 
     Raises
     ------
@@ -111,13 +154,13 @@ def memory_figure(trace: Trace, name: str) -> Figure:
     beliefs = trace.beliefs
     if beliefs is None or beliefs.retrieved is None or beliefs.similarity is None:
         raise ValueError("this agent has no memory")
-    figure = figure_of(11.5, 6.2)
+    figure = figure_of(11.5, 6.6, caption)
     left, right = figure.subplots(1, 2, width_ratios=(1.35, 1))
     draw_place(left, trace)
     if trace.exploration_trajectory is not None:
         walk = trace.scene.grid.centres[trace.exploration_trajectory // HEADINGS]
         left.plot(*walk.T, color="#9a9a9a", lw=1.0, zorder=6, label="exploration walk")
-    draw_walk(left, trace, RUN_COLOURS[1], f"{name}: {outcome(trace)}")
+    draw_walk(left, trace, RUN_COLOURS[1], wrapped(f"{name}: {outcome(trace)}"))
     here, best = trace.path[:-1], beliefs.retrieved[:, 0]
     sure = np.clip((beliefs.similarity[:, 0] - 0.9) / 0.1, 0.08, 1)
     for place, entry, weight in zip(here, best, sure, strict=True):
@@ -132,7 +175,15 @@ def memory_figure(trace: Trace, name: str) -> Figure:
         label="most similar entry",
     )
     left.set_title(title_of(trace), fontsize=10)
-    left.legend(loc="upper left", bbox_to_anchor=(0, 0), frameon=False, fontsize=9)
+    lines: dict[str, Any] = {
+        "color": RUN_COLOURS[0],
+        "lw": 1.2,
+        "label": "from the agent to that entry",
+    }
+    handles = [*left.get_legend_handles_labels()[0], Line2D([], [], **lines), *marker_handles()]
+    left.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(0, 0), frameon=False, fontsize=8, ncols=2
+    )
     off = np.linalg.norm(best[:, :2] - here, axis=1)
     right.plot(off, color=RUN_COLOURS[0], label="position error of the most similar entry")
     lost = np.linalg.norm(beliefs.pose[:, :2] - here, axis=1)

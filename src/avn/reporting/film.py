@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,8 +41,10 @@ def write_film(
     views: NDArray[np.uint8],
     clips: Tensor,
     track: NDArray[np.float32],
+    speed: float = 1.0,
+    note: str = "",
 ) -> None:
-    """Write a film of an episode of T actions as MP4, T + 1 seconds long.
+    """Write a film of an episode of T actions as MP4, (T + 1) / speed seconds long.
 
     Parameters
     ----------
@@ -55,6 +58,10 @@ def write_film(
         Binaural clip at each step, for the spectrograms.
     track : (rate (T + 1), 2) float32
         Soundtrack; see `avn.pipeline.observed.soundtrack`.
+    speed : float
+        Steps per second. The pitch of the sound does not change.
+    note : str
+        Warning about the run, such as `avn.reporting.world.TRIAL_NOTE`.
 
     Raises
     ------
@@ -70,18 +77,21 @@ def write_film(
         writer = imageio_ffmpeg.write_frames(
             str(part),
             SIZE,
-            fps=FPS,
+            fps=FPS * speed,
             codec="libx264",
             quality=7,
             audio_path=str(wave),
             audio_codec="aac",
             ffmpeg_log_level="error",
             # the format is explicit because the temporary file has another suffix
-            output_params=["-ar", "48000", "-b:a", "192k", "-movflags", "+faststart", "-f", "mp4"],
+            output_params=[
+                *(["-filter:a", f"atempo={speed:g}"] if speed != 1 else []),
+                *("-ar", "48000", "-b:a", "192k", "-movflags", "+faststart", "-f", "mp4"),
+            ],
         )
         try:
             writer.send(None)
-            for frame in frames(trace, name, views, clips):
+            for frame in frames(trace, name, views, clips, note):
                 writer.send(np.ascontiguousarray(frame))
         except OSError as error:
             reason = " ".join(str(error).split())[-200:]
@@ -91,7 +101,7 @@ def write_film(
 
 
 def frames(
-    trace: Trace, name: str, views: NDArray[np.uint8], clips: Tensor
+    trace: Trace, name: str, views: NDArray[np.uint8], clips: Tensor, note: str = ""
 ) -> Iterator[NDArray[np.uint8]]:
     """Generate the frames of a film, `FPS` per step.
 
@@ -102,8 +112,10 @@ def frames(
         Name of the run.
     views : (T + 1, H, W, 3) uint8
         View at each step, sRGB.
-    clips : (T + 1, 2, 16000) float32 tensor
-        Binaural clip at each step at 16 kHz.
+    clips : (T + 1, 2, rate) float32 tensor
+        Binaural clip at each step, one second long.
+    note : str
+        Warning about the run, in the last line.
 
     Yields
     ------
@@ -111,10 +123,20 @@ def frames(
         sRGB.
     """
     stage = _Stage(trace, name, views, clips)
+    stage.add_note(note)
     for step in range(len(trace.state)):
         picture = stage.draw(step)
         for beat in range(FPS):
             yield stage.with_cursor(picture, beat / FPS)
+
+
+def _frequency_ticks(rate: int, bands: int) -> tuple[list[float], list[str]]:
+    """Return rows and labels of some frequencies in a mel spectrogram with the lowest band last."""
+    shown = [hertz for hertz in (500, 2000, 6000) if hertz < rate / 2]
+    # the centres of the bands are evenly spaced in mel; see `avn.modules.spectrogram.band_weights`
+    shares = [math.log1p(hertz / 700) / math.log1p(rate / 1400) for hertz in shown]
+    places = [bands - share * (bands + 1) for share in shares]
+    return places, [f"{hertz / 1000:g}" for hertz in shown]
 
 
 class _Stage:
@@ -126,15 +148,24 @@ class _Stage:
         self.canvas = FigureCanvasAgg(self.figure)
         self.view = self._panel(12, 258, 450, 450)
         self.picture = self.view.imshow(views[0], interpolation="bicubic")
-        pictures = Spectrogram(scale="mel", frames=100, interaural=False)(clips)
-        self.pictures = torch.flip(pictures, dims=(2,)).numpy()  # low frequencies at the bottom
+        rate = clips.shape[-1]
+        columns = max(count for count in range(1, 101) if rate % count == 0)
+        spectrogram = Spectrogram(rate, scale="mel", frames=columns, interaural=False)
+        # low frequencies at the bottom
+        self.pictures = torch.flip(spectrogram(clips), dims=(2,)).numpy()
         low, high = np.quantile(self.pictures, (0.02, 0.998))
-        self.ears = [self._panel(62, 136, 400, 104), self._panel(62, 22, 400, 104)]
+        self.ears = [self._panel(66, 140, 396, 102), self._panel(66, 30, 396, 102)]
         self.sounds = []
         for ear, (axes, word) in enumerate(zip(self.ears, ("left", "right"), strict=True)):
             style: dict[str, Any] = {"aspect": "auto", "cmap": "magma", "vmin": low, "vmax": high}
             self.sounds.append(axes.imshow(self.pictures[0, ear], **style))
-            axes.set_ylabel(f"{word} ear", fontsize=10)
+            axes.set_ylabel(f"{word} ear, kHz", fontsize=9)
+            places, labels = _frequency_ticks(rate, spectrogram.bands)
+            axes.set_yticks(places, labels, fontsize=8)
+        ends = [-0.5, columns / 2 - 0.5, columns - 0.5]
+        self.ears[1].set_xticks(ends, ["0", "0.5", "1 s"], fontsize=8)
+        for axes in self.ears:
+            axes.tick_params(length=2, pad=1)
         self.map = self._panel(484, 60, 784, 560)
         self._draw_map()
         self.figure.text(484 / 1280, 690 / 720, f"{name}", fontsize=15, weight="bold", va="center")
@@ -193,15 +224,23 @@ class _Stage:
         )
 
     def _legend(self) -> None:
-        words = ["star: the source"]
+        words = ["star: source", "triangle: agent, pink: its path"]
+        if self.trace.collided.any():
+            words.append("black x: collision")
         if self.trace.source_estimates is not None:
-            words.append("blue cross: source estimate")
+            words.append("blue plus: source estimate")
+        second = []
         if self.belief is not None:
-            words.append("occupancy belief: green free, brown blocked")
-        self.figure.text(484 / 1280, 34 / 720, "    ".join(words), fontsize=10, color="0.3")
+            second.append("belief: green free, brown blocked")
         if self.recalled is not None:
-            memory = "grey: exploration walk in memory, purple: most similar memory entries"
-            self.figure.text(484 / 1280, 12 / 720, memory, fontsize=10, color="0.3")
+            second.append("memory: grey exploration walk, purple most similar entries")
+        for height, line in ((40, words), (24, second)):
+            place = (484 / 1280, height / 720)
+            self.figure.text(*place, "    ".join(line), fontsize=9, color="0.3")
+
+    def add_note(self, note: str) -> None:
+        """Write a warning into the last line of all frames."""
+        self.figure.text(484 / 1280, 7 / 720, note, fontsize=9, color="#8a5a00")
 
     def draw(self, step: int) -> NDArray[np.uint8]:
         """Draw one step, (720, 1280, 3) uint8."""

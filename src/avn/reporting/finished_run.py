@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -33,26 +34,38 @@ def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     try:
         runs = results.read_csv(folder / RESULTS)
         episodes = results.read_csv(folder / EPISODE_RECORDS)
-        pd.testing.assert_frame_equal(runs, results.summarise(episodes))
+        summary = results.summarise(episodes)
+        # the rule for intervals may have changed since the run
+        ends = list(results.INTERVALS)
+        pd.testing.assert_frame_equal(runs.drop(columns=ends), summary.drop(columns=ends))
     except (OSError, ValueError, KeyError, AssertionError, UserError) as error:
         raise UserError(f"{folder}: the run is damaged; delete the folder and run again") from error
-    return runs, episodes
+    return summary, episodes
 
 
-def show_run(folder: Path, privileged: bool = False) -> None:
+def show_run(folder: Path, caption: str, privileged: bool, paper: Sequence[str] = ()) -> None:
     """Print the results of a run by scene and sound, by difficulty, and of its perception.
 
     Parameters
     ----------
     folder : Path
         Folder of the run.
+    caption : str
+        World of the run, for the caption of each table.
     privileged : bool
         Whether its agent has access to ground truth.
+    paper : sequence of str
+        Sounds beside whose results those of the paper may stand.
     """
     runs, episodes = read_run(folder)
-    table.print_tables(runs, episodes, privileged=list(set(runs["agent"])) if privileged else [])
-    console = table.wide_console()
+    labels = list(dict.fromkeys(runs["agent"]))
+    table.print_tables(
+        runs,
+        episodes,
+        privileged=labels if privileged else [],
+        paper={label: frozenset(paper) for label in labels},
+        caption=caption,
+    )
     for name, tabulate in _PERCEPTION.items():
         if (folder / name).is_file():
-            console.print(tabulate(results.read_csv(folder / name)))
-            console.print()
+            table.print_table(tabulate(results.read_csv(folder / name)), caption)

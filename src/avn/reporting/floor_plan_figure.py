@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,15 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from PIL import Image
 
-from avn.apartments.floor_plan import DOOR_WIDTH, WALL_THICKNESS, Doorway, FloorPlan, Piece, Window
+from avn.apartments.floor_plan import (
+    DOOR_WIDTH,
+    WALL_THICKNESS,
+    Doorway,
+    FloorPlan,
+    Piece,
+    Room,
+    Window,
+)
 from avn.apartments.grid import Grid, build_grid, source_cells
 from avn.apartments.surfaces import walls
 
@@ -33,6 +42,8 @@ MATERIAL_COLOURS = {
     "glass": "#a9d3e6",
     "books": "#a67c63",
 }
+# Left, bottom, right and top in metres.
+Box = tuple[float, float, float, float]
 HEADINGS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 _INCHES_A_METRE = 1.05
 _DPI = 100
@@ -52,16 +63,6 @@ def draw_floor_plan(axes: Axes, plan: FloorPlan, grid: Grid | None = None) -> No
     for room in plan.rooms:
         corner, size = (room.x0, room.y0), (room.x1 - room.x0, room.y1 - room.y0)
         axes.add_patch(Rectangle(corner, *size, color=ROOM_COLOURS[room.kind], zorder=0))
-        axes.text(
-            room.x0 + 0.12,
-            room.y1 - 0.12,
-            room.kind.replace("_", " "),
-            va="top",
-            fontsize=8,
-            style="italic",
-            color="#666666",
-            zorder=6,
-        )
     for x0, y0, x1, y1 in walls(plan):
         axes.add_patch(
             Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#333333", linewidth=0, zorder=3)
@@ -71,6 +72,12 @@ def draw_floor_plan(axes: Axes, plan: FloorPlan, grid: Grid | None = None) -> No
     for piece in sorted(plan.furniture, key=lambda piece: piece.z):
         _draw_piece(axes, piece)
     _draw_grid(axes, plan, grid)
+    taken = [piece.bounds for piece in plan.furniture]
+    taken += [
+        (x - 0.2, y - 0.2, x + 0.2, y + 0.2) for x, y in grid.centres[source_cells(plan, grid)]
+    ]
+    for room in plan.rooms:
+        _draw_name(axes, room, taken)
     x0, y0 = (min(getattr(r, k) for r in plan.rooms) for k in ("x0", "y0"))
     x1, y1 = (max(getattr(r, k) for r in plan.rooms) for k in ("x1", "y1"))
     axes.set(xlim=(x0 - 0.2, x1 + 0.2), ylim=(y0 - 0.2, y1 + 0.2), aspect="equal")
@@ -78,6 +85,30 @@ def draw_floor_plan(axes: Axes, plan: FloorPlan, grid: Grid | None = None) -> No
     axes.set_title(
         f"{plan.name}: {grid.cells} cells, {grid.squares} squares, {len(plan.sources)} sources",
         fontsize=9,
+    )
+
+
+def _draw_name(axes: Axes, room: Room, taken: Sequence[Box]) -> None:
+    """Write a room's name where it covers the least furniture and no source, corners first."""
+    name = room.kind.replace("_", " ")
+    # a letter is about half as wide as the font size of 8; a point is 1/72 inch
+    width = 0.55 * 8 * len(name) / 72 / _INCHES_A_METRE
+    height = 1.2 * 8 / 72 / _INCHES_A_METRE
+    lefts = np.linspace(room.x0 + 0.12, max(room.x0 + 0.12, room.x1 - 0.12 - width), 9)
+    tops = np.linspace(room.y1 - 0.12, room.y0 + 0.12 + height, 17)
+    places = [(x, y) for y in tops for x in lefts]
+    covered = [_overlap((x, y - height, x + width, y), taken) for x, y in places]
+    x, y = places[int(np.argmin(np.round(covered, 4)))]
+    axes.text(x, y, name, va="top", fontsize=8, style="italic", color="#666666", zorder=6)
+
+
+def _overlap(box: Box, others: Sequence[Box]) -> float:
+    """Return the area of a box that others cover, in square metres."""
+    x0, y0, x1, y1 = box
+    return sum(
+        max(0.0, min(x1, other[2]) - max(x0, other[0]))
+        * max(0.0, min(y1, other[3]) - max(y0, other[1]))
+        for other in others
     )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any
@@ -13,12 +14,14 @@ import pandas as pd
 from avn.core.errors import UserError
 from avn.reporting.breakdown import breakdown_figure
 from avn.reporting.page_media import figure_url
-from avn.reporting.results import ALL_SOUNDS, AVERAGE, compare
-from avn.reporting.table import PAPER, PAPER_PROTOCOL, paper_table
+from avn.reporting.paper import PAPER, paper_results
+from avn.reporting.results import ALL_SOUNDS, AVERAGE, NO_INTERVAL, compare
 from avn.reporting.trajectory_figures import RUN_COLOURS
 
 _TEMPLATES = "avn.reporting"
 _ENDS = ("low", "high")
+# Identity of an episode in all runs that have it.
+_SAME = ("scene", "sound", "seed", "episode", "source_cell", "start_cell", "start_heading")
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,10 @@ class PageRun:
         For a group of runs that differ only in their seed: its `results.across_seeds`.
     within : bool
         True if the run is a member of such a group.
+    world : str
+        World of the run in words; see `avn.pipeline.benchmark.describe_world`.
+    paper : collection of str
+        Sounds beside whose results those of the paper stand.
     """
 
     name: str
@@ -53,6 +60,8 @@ class PageRun:
     paths: list[dict[str, Any]] | None = None
     seeds: pd.DataFrame | None = None
     within: bool = False
+    world: str = ""
+    paper: Collection[str] = ()
 
 
 def render(
@@ -61,6 +70,7 @@ def render(
     plans: Sequence[dict[str, Any]],
     views: Sequence[str],
     episodes: Sequence[dict[str, Any]],
+    note: str = "",
 ) -> str:
     """Render the page as self-contained HTML.
 
@@ -75,6 +85,8 @@ def render(
     episodes : sequence of dict
         Embedded episodes, which refer to plans and views by index; see
         `page_media.episode_media`.
+    note : str
+        Warning about the results, such as `avn.reporting.world.TRIAL_NOTE`.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(_TEMPLATES),
@@ -83,7 +95,8 @@ def render(
         trim_blocks=True,
     )
     named = dict.fromkeys(scene for run in runs for scene in run.results["scene"])
-    scenes = [*(scene for scene in named if scene != AVERAGE), AVERAGE]
+    apartments = [scene for scene in named if scene != AVERAGE]
+    scenes = [*apartments, AVERAGE] if len(apartments) > 1 else apartments
     rows = [row for index, run in enumerate(runs) for row in _rows(index, run, scenes)]
     data = {
         "average": AVERAGE,
@@ -101,6 +114,12 @@ def render(
     }
     return environment.get_template("report.html.j2").render(
         title=title,
+        note=note,
+        worlds=list(dict.fromkeys(run.world for run in runs if run.world)),
+        no_interval=NO_INTERVAL,
+        intervals_missing=any(
+            cell and cell["sr_low"] is None for row in rows for cell in row["cells"]
+        ),
         paper=PAPER,
         has_paper=any(cell and cell["paper"] for row in rows for cell in row["cells"]),
         scenes=scenes,
@@ -109,7 +128,8 @@ def render(
         data=data,
         views=list(views),
         episodes=list(episodes),
-        breakdown=_breakdown(runs),
+        breakdown=_breakdown(runs, note),
+        shown_runs=[run.name for run in runs if not run.within],
         any_paths=any(run.paths for run in runs),
         base=next(run.name for run in runs if not run.within),
         differences=_differences(runs),
@@ -136,23 +156,14 @@ def _colour(index: int) -> str:
 
 def _rows(index: int, run: PageRun, scenes: Sequence[str]) -> list[dict[str, Any]]:
     """Return the rows of a run in the table of results, one per sound."""
-    paper = _paper()
     rows = []
     for sound, part in run.results.groupby("sound", sort=False):
         own = {str(row["scene"]): row for row in part.to_dict("records")}
-        cells: list[dict[str, Any] | None] = []
-        for scene in scenes:
-            if scene not in own:
-                cells.append(None)
-                continue
-            found, key = own[scene], (str(own[scene]["agent"]), str(own[scene]["protocol"]))
-            cell: dict[str, Any] = {"scene": scene, "paper": paper.get((*key, str(sound), scene))}
-            for metric in ("sr", "spl"):
-                cell[metric] = round(100 * found[metric], 2)
-                for end in _ENDS:
-                    cell[f"{metric}_{end}"] = 100 * found[f"{metric}_{end}"]
-            cell["spread"] = _spread(run, str(sound), scene)
-            cells.append(cell)
+        paper = _paper(str(part["agent"].iloc[0]), str(sound), run.paper)
+        cells = [
+            _cell(run, str(sound), own[scene], paper.get(scene)) if scene in own else None
+            for scene in scenes
+        ]
         rows.append(
             {
                 "run": index,
@@ -166,13 +177,27 @@ def _rows(index: int, run: PageRun, scenes: Sequence[str]) -> list[dict[str, Any
     return rows
 
 
+def _cell(
+    run: PageRun, sound: str, row: dict[Hashable, Any], paper: tuple[float, float] | None
+) -> dict[str, Any]:
+    """Return a cell of the table in %, in full precision; missing intervals are None."""
+    scene = str(row["scene"])
+    cell: dict[str, Any] = {"scene": scene, "paper": paper, "spread": _spread(run, sound, scene)}
+    for metric in ("sr", "spl"):
+        cell[metric] = 100 * row[metric]
+        for end in _ENDS:
+            value = 100 * row[f"{metric}_{end}"]
+            cell[f"{metric}_{end}"] = None if math.isnan(value) else value
+    return cell
+
+
 def _spread(run: PageRun, sound: str, scene: str) -> tuple[float, float] | None:
     """Return the standard deviation of success rate and SPL over seeds in percentage points."""
     if run.seeds is None:
         return None
     chosen = (run.seeds["sound"] == sound) & (run.seeds["scene"] == scene)
-    row = run.seeds[chosen].iloc[0]
-    return 100 * float(row["sr_std"]), 100 * float(row["spl_std"])
+    row = 100 * run.seeds[chosen].iloc[0][["sr_std", "spl_std"]].astype(float)
+    return None if row.isna().any() else (float(row["sr_std"]), float(row["spl_std"]))
 
 
 def _differences(runs: Sequence[PageRun]) -> list[dict[str, Any]]:
@@ -185,26 +210,23 @@ def _differences(runs: Sequence[PageRun]) -> list[dict[str, Any]]:
         except UserError:
             continue
         points = 100 * table.loc[["sr", "spl"], ["difference", "low", "high"]].to_numpy()
-        rows.append({"name": run.name, "sr": points[0].tolist(), "spl": points[1].tolist()})
+        known = [[None if math.isnan(value) else value for value in row] for row in points.tolist()]
+        rows.append({"name": run.name, "sr": known[0], "spl": known[1]})
     return rows
 
 
-def _breakdown(runs: Sequence[PageRun]) -> str:
+def _breakdown(runs: Sequence[PageRun], note: str) -> str:
     """Draw the results by difficulty as a data URL, in the colours of the runs."""
     own = {run.name: index for index, run in enumerate(runs) if not run.within}
     episodes = {name: runs[index].episodes for name, index in own.items()}
-    return figure_url(breakdown_figure(episodes, [_colour(index) for index in own.values()]))
+    return figure_url(breakdown_figure(episodes, [_colour(index) for index in own.values()], note))
 
 
-def _paper() -> dict[tuple[str, ...], tuple[float, float]]:
-    """Return the paper's success rate and SPL in % by agent, protocol, sound and scene."""
-    table = paper_table()
-    means = table.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
-    table = pd.concat([table, means.assign(sound=ALL_SOUNDS)])
-    return {
-        (row["agent"], PAPER_PROTOCOL, row["sound"], row["scene"]): (row["sr"], row["spl"])
-        for row in table.to_dict("records")
-    }
+def _paper(agent: str, sound: str, sounds: Collection[str]) -> dict[str, tuple[float, float]]:
+    """Return the paper's success rate and SPL in % of an agent and sound by scene."""
+    rows = paper_results({agent: sounds})
+    own = rows[rows["sound"] == sound].to_dict("records")
+    return {str(row["scene"]): (float(row["sr"]), float(row["spl"])) for row in own}
 
 
 def _episodes(run: PageRun) -> list[list[Any]]:
@@ -218,11 +240,13 @@ def _episodes(run: PageRun) -> list[list[Any]]:
             int(row["in_sight"]),
             int(row["rooms_crossed"]),
             str(row["outcome"]),
-            round(float(row["spl"]), 3),
+            float(row["spl"]),
             int(row["actions"]),
             run.media.get(int(label)),
             place,
             int(row["source_cell"]),
+            int(row["success"]),
+            ":".join(str(row[key]) for key in _SAME),
         ]
         for place, (label, row) in enumerate(
             zip(run.episodes.index, run.episodes.to_dict("records"), strict=True)

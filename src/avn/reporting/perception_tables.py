@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import pandas as pd
 from rich.table import Table
 
+from avn.reporting.results import ALL_SOUNDS
+
 
 def source_estimates_table(source_estimates: pd.DataFrame) -> Table:
     """Tabulate the errors of source estimates by sound and line of sight.
@@ -22,6 +24,8 @@ def source_estimates_table(source_estimates: pd.DataFrame) -> Table:
     table = _table("source estimates: mean over scenes of the median error", columns)
     metrics = ["error_m", "bearing_deg", "front_back"]
     means = source_estimates.groupby(["sound", "sight"], as_index=False, sort=False)[metrics].mean()
+    if means["sound"].nunique() == 2:  # one sound, and the same again as `all`
+        means = means[means["sound"] != ALL_SOUNDS]
     for row in means.to_dict("records"):
         label = f"{row['sound']}, {row['sight'].replace('_', ' ')}"
         metres, degrees = f"{row['error_m']:.2f}", f"{row['bearing_deg']:.0f}"

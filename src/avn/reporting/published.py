@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,17 @@ import pandas as pd
 from rich.table import Table
 from rich.text import Text
 
-from avn.reporting.results import ALL_SOUNDS, AVERAGE, LABELS, across_seeds, summarise
-from avn.reporting.table import PAPER, PAPER_PROTOCOL, paper_table, readable
+from avn.reporting.paper import PAPER, paper_results
+from avn.reporting.results import (
+    ALL_SOUNDS,
+    LABELS,
+    NO_INTERVAL,
+    USUAL_LOOK,
+    across_seeds,
+    shown_scenes,
+    summarise,
+)
+from avn.reporting.table import readable
 
 # Common seed, with which the episodes of several seeds are pooled into one run.
 _POOLED = -1
@@ -20,7 +30,11 @@ OWN, INTERVAL, SPREAD = "own", "95 %", "± over seeds"
 ENDS = ("low", "high")
 
 
-def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
+def published(
+    runs: pd.DataFrame,
+    episodes: pd.DataFrame,
+    paper: Mapping[str, Collection[str]] = MappingProxyType({}),
+) -> pd.DataFrame:
     """Combine the results of all runs into one row per agent, setting, sound and scene.
 
     Parameters
@@ -29,14 +43,17 @@ def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
         Results of all runs; see `avn.reporting.results.summarise`.
     episodes : DataFrame
         Episodes of all runs.
+    paper : mapping of str to collection of str
+        Sounds by agent beside which the paper's results stand; see
+        `avn.reporting.paper.paper_results`.
 
     Returns
     -------
     DataFrame
         `LABELS`, `sound`, `scene`; `sr` and `spl`, means over runs in %; `sr_low` to `spl_high`,
-        95 % confidence intervals over (scene, source) clusters of the pooled episodes; `sr_std`
-        and `spl_std`, standard deviations over seeds; `paper_sr` and `paper_spl`, NaN if the
-        paper has no such row.
+        95 % confidence intervals over (scene, source) clusters of the pooled episodes, NaN where
+        there are too few; `sr_std` and `spl_std`, standard deviations over seeds; `paper_sr` and
+        `paper_spl`, NaN where the paper's results do not belong.
     """
     keys = [*LABELS, "sound", "scene"]
     intervals = summarise(episodes.assign(seed=_POOLED))
@@ -45,26 +62,13 @@ def published(runs: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
     found = spread.merge(intervals[[*keys, *ends]], on=keys, how="left", sort=False)
     percent = ["sr", "spl", "sr_std", "spl_std", *ends]
     found[percent] *= 100.0
-    paper = paper_table()
-    means = paper.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
-    paper = pd.concat([paper, means.assign(sound=ALL_SOUNDS)]).assign(protocol=PAPER_PROTOCOL)
-    paper = paper.rename(columns={"sr": "paper_sr", "spl": "paper_spl"})
-    return found.merge(paper, on=["agent", "protocol", "sound", "scene"], how="left", sort=False)
-
-
-def paper_averages() -> dict[str, str]:
-    """Return the paper's success rate and SPL of each agent over all sounds and scenes."""
-    paper = paper_table()
-    average = paper[paper["scene"] == AVERAGE].groupby("agent")[["sr", "spl"]].mean()
-    return {
-        str(row): _pair(*metrics)
-        for row, metrics in zip(average.index, average.to_numpy(), strict=True)
-    }
+    own = paper_results(paper).rename(columns={"sr": "paper_sr", "spl": "paper_spl"})
+    return found.merge(own, on=["agent", "sound", "scene"], how="left", sort=False)
 
 
 def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
     """Lay the table out for a terminal; agents in `privileged` are marked as upper bounds."""
-    scenes = list(dict.fromkeys(cells["scene"]))
+    scenes = shown_scenes(cells)
     title = f"success rate / SPL, % ({_settings(cells)})"
     table = Table(title=title, box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
@@ -81,7 +85,27 @@ def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
     return table
 
 
-def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str] = ()) -> str:
+def legend(cells: pd.DataFrame) -> str:
+    """Name the lines below each pair of success rate and SPL, and what is missing and why."""
+    lines = []
+    if cells["sr_low"].notna().any():
+        lines.append("the 95 % interval")
+    if cells["sr_std"].notna().any():
+        lines.append("the standard deviation over seeds")
+    if cells["paper_sr"].notna().any():
+        lines.append(f"in parentheses, the results of the paper ({PAPER})")
+    text = f"Below each pair: {'; '.join(lines)}." if lines else ""
+    if cells["sr_low"].isna().any():
+        text += f" A pair without interval has {NO_INTERVAL}."
+    return text.strip()
+
+
+def markdown(
+    cells: pd.DataFrame,
+    sounds: Sequence[str],
+    privileged: Collection[str] = (),
+    caption: str = "",
+) -> str:
     """Format the table as Markdown, one table per sound with rows of agents.
 
     Parameters
@@ -92,14 +116,14 @@ def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[
         Names of the sounds, in order.
     privileged : collection of str
         Agents that are marked as upper bounds.
+    caption : str
+        World of the results.
     """
-    text = [
-        f"Success rate / SPL in % ({_settings(cells)}). Below each pair: the 95 % interval, the "
-        "standard deviation over seeds and, in parentheses, the results of the paper.",
-        "",
-    ]
+    text = [f"Success rate / SPL in % ({_settings(cells)}). {legend(cells)}".strip(), ""]
+    for line in caption.splitlines():
+        text += [f"{line[:1].upper()}{line[1:]}.", ""]
     for sound, part in _by_sound(cells, sounds):
-        scenes = list(dict.fromkeys(part["scene"]))
+        scenes = shown_scenes(part)
         text += [f"### {sound}", "", f"| | {' | '.join(_cell_safe(readable(r)) for r in scenes)} |"]
         text.append("| --- " * (1 + len(scenes)) + "|")
         for agent, own in part.groupby("agent", sort=False):
@@ -110,7 +134,12 @@ def markdown(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[
     return "\n".join(text)
 
 
-def latex(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str] = ()) -> str:
+def latex(
+    cells: pd.DataFrame,
+    sounds: Sequence[str],
+    privileged: Collection[str] = (),
+    caption: str = "",
+) -> str:
     """Format the table as one LaTeX `tabular`, with a `shortstack` per cell.
 
     Parameters
@@ -121,9 +150,11 @@ def latex(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str
         Names of the sounds, in order.
     privileged : collection of str
         Agents that are marked as upper bounds.
+    caption : str
+        World of the results, printed in the last row of the table.
     """
-    scenes = list(dict.fromkeys(cells["scene"]))
-    text = [f"% success rate / SPL in %: {_settings(cells)}"]
+    scenes = shown_scenes(cells)
+    text = [f"% success rate / SPL in %: {_settings(cells)}. {legend(cells)}".strip()]
     text += ["\\begin{tabular}{ll" + "c" * len(scenes) + "}", "\\hline"]
     heads = ["Sound", "Agent", *(_escaped(readable(scene)) for scene in scenes)]
     text.append(" & ".join(heads) + " \\\\ \\hline")
@@ -135,14 +166,19 @@ def latex(cells: pd.DataFrame, sounds: Sequence[str], privileged: Collection[str
             name = _escaped(f"{agent}{_mark(str(agent), privileged)}")
             text.append(" & ".join([_escaped(sound), name, *found]) + " \\\\")
         text.append("\\hline")
+    for line in caption.splitlines():
+        text.append(
+            f"\\multicolumn{{{2 + len(scenes)}}}{{l}}{{\\footnotesize {_escaped(line)}}} \\\\"
+        )
     return "\n".join([*text, "\\end{tabular}", ""])
 
 
 def _settings(cells: pd.DataFrame) -> str:
     """Describe the protocol, acoustics and `look` settings of a table."""
-    return ", ".join(
-        f"{key}={' and '.join(dict.fromkeys(map(str, cells[key])))}" for key in LABELS[1:]
-    )
+    values = {key: list(dict.fromkeys(map(str, cells[key]))) for key in LABELS[1:]}
+    if values["look"] == [USUAL_LOOK]:
+        del values["look"]
+    return ", ".join(f"{key}={' and '.join(own)}" for key, own in values.items())
 
 
 def _mark(agent: str, privileged: Collection[str]) -> str:

@@ -9,9 +9,11 @@ import pandas as pd
 
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
-from avn.navigation.metrics import cluster_bootstrap
+from avn.navigation.metrics import MIN_CLUSTERS, cluster_bootstrap
 
 LABELS = ("agent", "protocol", "acoustics", "look")
+# Value of `look` of every agent that does not rotate to observe, not named in headings.
+USUAL_LOOK = "once"
 EPISODE_COLUMNS = (
     *LABELS,
     *("sound", "scene", "seed", "episode", "start_cell", "start_heading", "source", "source_cell"),
@@ -26,6 +28,7 @@ INTERVALS = tuple(f"{metric}_{end}" for metric in METRICS for end in ("low", "hi
 RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *METRICS, *INTERVALS)
 ALL_SOUNDS = "all"
 AVERAGE = "average"
+NO_INTERVAL = f"too few sources (fewer than {MIN_CLUSTERS}) for an interval"
 _PAIR = ["sound", "scene", "seed", "episode"]
 
 
@@ -45,7 +48,7 @@ def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
     DataFrame
         Columns `RESULT_COLUMNS`. Scene `average` is the unweighted mean over scenes, as in the
         paper. Sound `all` pools the episodes of all sounds if there are several. Intervals are
-        95 % bootstrap intervals over (scene, source) clusters.
+        95 % bootstrap intervals over (scene, source) clusters, NaN where there are too few.
 
     Raises
     ------
@@ -135,8 +138,8 @@ def compare(one: pd.DataFrame, other: pd.DataFrame, draws: int = 2000) -> pd.Dat
     Returns
     -------
     DataFrame
-        `metric`, `difference`, and its 95 % confidence interval `low`, `high`. Scenes have equal
-        weight.
+        `metric`, `difference`, and its 95 % confidence interval `low`, `high`, NaN with too few
+        (scene, source) clusters. Scenes have equal weight.
 
     Raises
     ------
@@ -159,6 +162,12 @@ def compare(one: pd.DataFrame, other: pd.DataFrame, draws: int = 2000) -> pd.Dat
     return pd.DataFrame(
         {"metric": list(METRICS), "difference": weights @ values, "low": low, "high": high}
     )
+
+
+def shown_scenes(results: pd.DataFrame) -> list[str]:
+    """Return the scenes of a table in order; without the average where there is a single scene."""
+    scenes = list(dict.fromkeys(results["scene"].astype(str)))
+    return [scene for scene in scenes if scene != AVERAGE] if len(scenes) == 2 else scenes
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:

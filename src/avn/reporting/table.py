@@ -2,61 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from importlib import resources
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from avn.reporting.results import ALL_SOUNDS, AVERAGE
-
-PAPER = "Gan et al. 2020"
-PAPER_PROTOCOL = "var"
-
-
-def paper_table() -> pd.DataFrame:
-    """Read the results of the paper in long form: agent, sound, scene, sr, spl, both in %.
-
-    Gan, Zhang, Wu, Gong and Tenenbaum, "Look, Listen, and Act: Towards Audio-Visual Embodied
-    Navigation", ICRA 2020, table I. Its scenes are other apartments of the same size.
-    """
-    file = resources.files("avn") / "assets" / "paper_table.csv"
-    with file.open(encoding="utf-8") as lines:
-        return pd.read_csv(lines)
+from avn.reporting.paper import PAPER, paper_results
+from avn.reporting.results import AVERAGE, USUAL_LOOK, shown_scenes
 
 
-def results_table(results: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
+def results_table(
+    results: pd.DataFrame,
+    privileged: Collection[str] = (),
+    paper: Mapping[str, Collection[str]] = MappingProxyType({}),
+) -> Table:
     """Tabulate success rate / SPL in %, with rows of agents and sounds and columns of scenes.
 
-    Results of several seeds are averaged. Rows of protocol `var` are followed by those of the
-    paper if it has them; its `all` is the mean over its sounds. Agents in `privileged` are marked
-    as upper bounds.
+    Results of several seeds are averaged.
+
+    Parameters
+    ----------
+    results : DataFrame
+        As in `results.csv`.
+    privileged : collection of str
+        Agents that are marked as upper bounds.
+    paper : mapping of str to collection of str
+        Sounds by agent whose results are followed by those of the paper; see
+        `avn.reporting.paper.paper_results`.
     """
-    scenes = list(dict.fromkeys(results["scene"]))
+    scenes = shown_scenes(results)
     table = Table(title="success rate / SPL, %", box=None, pad_edge=False, title_justify="left")
     table.add_column("", no_wrap=True)
     for scene in scenes:
         table.add_column(readable(scene), justify="right", no_wrap=True)
-    paper = _paper_cells()
+    papers = paper_results(paper).set_index(["agent", "sound", "scene"])
     columns = ["agent", "protocol", "acoustics", "look"]
     for keys, run in results.groupby(columns, sort=False):
         names = [str(key) for key in keys]
+        names = names[:-1] if names[-1] == USUAL_LOOK else names
         mark = " (privileged: upper bound)" if names[0] in privileged else ""
-        table.add_row(f"[bold]{' · '.join(names)}{mark}[/bold]")
+        table.add_row(Text(f"{' · '.join(names)}{mark}", style="bold"))
         for sound, part in run.groupby("sound", sort=False):
             means = 100.0 * part.groupby("scene", sort=False)[["sr", "spl"]].mean()
-            cells = [_cell(*row) for row in means.reindex(scenes).to_numpy()]
-            table.add_row(f"  {sound}", *cells)
-            own = [paper.get((*names[:2], str(sound), scene), "") for scene in scenes]
-            if any(own):
-                table.add_row(f"    {PAPER}", *own, style="dim")
+            table.add_row(f"  {sound}", *_cells(means, scenes))
+            own = papers.loc[papers.index.isin([(names[0], sound, s) for s in scenes])]
+            if len(own):
+                cells = _cells(own.droplevel(["agent", "sound"]), scenes)
+                table.add_row(f"    {PAPER}", *cells, style="dim")
     return table
 
 
 def hardness(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Compute the difficulty of the starts by scene and on average.
+    """Compute the difficulty of the starts by scene and, of several scenes, on average.
 
     Returns
     -------
@@ -77,9 +78,10 @@ def hardness(episodes: pd.DataFrame) -> pd.DataFrame:
     groups = described.groupby("scene", sort=False)
     table = groups.mean()
     table.insert(0, "episodes", groups.size())
-    average = table.mean()
-    average["episodes"] = len(episodes)
-    table.loc[AVERAGE] = average
+    if len(table) > 1:
+        average = table.mean()
+        average["episodes"] = len(episodes)
+        table.loc[AVERAGE] = average
     return table.reset_index().astype({"episodes": np.int64})
 
 
@@ -103,6 +105,8 @@ def print_tables(
     episodes: pd.DataFrame,
     console: Console | None = None,
     privileged: Collection[str] = (),
+    paper: Mapping[str, Collection[str]] = MappingProxyType({}),
+    caption: str = "",
 ) -> None:
     """Print the results and the difficulty of the starts.
 
@@ -114,13 +118,35 @@ def print_tables(
         As in `episodes.csv`.
     console : Console, optional
         `wide_console()` by default.
-    privileged : collection of str
-        Agents that are marked as upper bounds.
+    privileged, paper
+        As those of `results_table`.
+    caption : str
+        World of the results, below each heading.
     """
     console = console or wide_console()
-    for table in (results_table(results, privileged), hardness_table(episodes)):
-        console.print(table)
-        console.print()
+    print_table(results_table(results, privileged, paper), caption, console)
+    print_table(hardness_table(episodes), caption, console)
+
+
+def print_table(table: Table, caption: str = "", console: Console | None = None) -> None:
+    """Print a table below its heading and a caption, which may be wider than the table.
+
+    Parameters
+    ----------
+    table : Table
+        Table, of which the title is printed as the heading.
+    caption : str
+        Lines below the heading.
+    console : Console, optional
+        `wide_console()` by default.
+    """
+    console = console or wide_console()
+    title, table.title = table.title, None
+    console.print(Text(str(title), style="italic"))
+    if caption:
+        console.print(Text(caption, style="dim"))
+    console.print(table)
+    console.print()
 
 
 def wide_console() -> Console:
@@ -129,17 +155,11 @@ def wide_console() -> Console:
     return console if console.is_terminal else Console(width=120)
 
 
-def _paper_cells() -> dict[tuple[str, ...], str]:
-    """Format the paper's results by agent, protocol, sound and scene."""
-    table = paper_table()
-    means = table.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
-    table = pd.concat([table, means.assign(sound=ALL_SOUNDS)])
-    keys = zip(table["agent"], table["sound"], table["scene"], strict=True)
-    metrics = table[["sr", "spl"]].to_numpy()
-    return {
-        (agent, PAPER_PROTOCOL, sound, scene): _cell(*row)
-        for (agent, sound, scene), row in zip(keys, metrics, strict=True)
-    }
+def _cells(percent: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
+    """Format the success rate and SPL of each scene; empty where there is none."""
+    return [
+        _cell(*row) for row in percent.reindex(list(scenes))[["sr", "spl"]].to_numpy(np.float64)
+    ]
 
 
 def _cell(sr: float, spl: float) -> str:

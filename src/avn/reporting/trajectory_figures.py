@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
@@ -20,6 +22,8 @@ from avn.reporting.floor_plan_figure import draw_floor_plan
 
 # Colours of compared runs, distinguishable with colour vision deficiency.
 RUN_COLOURS = ("#d1495b", "#1f6fb2", "#3a9a5b", "#8a5fbf", "#c98a1b", "#4d4d4d")
+# Style of the source's star.
+_SOURCE: dict[str, Any] = {"color": "#ffb000", "mec": "black", "mew": 0.8, "markersize": 15}
 FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 
@@ -31,7 +35,7 @@ def plan_of(trace: Trace) -> FloorPlan | None:
 def draw_place(axes: Axes, trace: Trace) -> None:
     """Draw a trace's apartment in faint colours, in metres, and the source."""
     draw_apartment(axes, trace.scene)
-    axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=15, zorder=12)
+    axes.plot(*trace.goal, "*", zorder=12, **_SOURCE)
 
 
 def draw_apartment(axes: Axes, scene: NavigationScene) -> None:
@@ -93,7 +97,32 @@ def draw_walk(
         axes.plot(*path[-1], "X", color=colour, mec="white", markersize=10, zorder=11)
 
 
-def trajectory_figure(episodes: Sequence[Sequence[Trace]], names: Sequence[str]) -> Figure:
+def marker_handles(estimate: bool = False) -> list[Line2D]:
+    """Return the legend of the markers of a path; with `estimate`, that of a source estimate too.
+
+    They are those of `draw_walk` and `draw_place`, in grey.
+    """
+    grey: dict[str, Any] = {"color": "0.4", "linestyle": "none"}
+    handles = [
+        Line2D([], [], marker="o", mfc="white", mew=2, markersize=8, label="start", **grey),
+        Line2D([], [], marker="s", markersize=8, label="end, success", **grey),
+        Line2D([], [], marker="X", markersize=10, mec="white", label="end, failure", **grey),
+        Line2D([], [], marker="x", markersize=5, label="collision", **grey),
+        Line2D([], [], marker="*", label="source", **(grey | _SOURCE)),
+    ]
+    if estimate:
+        handles.append(Line2D([], [], marker="P", markersize=9, label="source estimate", **grey))
+    return handles
+
+
+def wrapped(text: str, letters: int = 62) -> str:
+    """Break a long label into lines, so that it does not run out of the figure."""
+    return "\n".join(textwrap.wrap(text, letters)) or text
+
+
+def trajectory_figure(
+    episodes: Sequence[Sequence[Trace]], names: Sequence[str], caption: str = ""
+) -> Figure:
     """Draw the trajectories of several runs in the same episodes.
 
     Parameters
@@ -102,6 +131,8 @@ def trajectory_figure(episodes: Sequence[Sequence[Trace]], names: Sequence[str])
         By episode and run.
     names : sequence of str
         Names of the runs.
+    caption : str
+        World of the runs, below the figure.
 
     Returns
     -------
@@ -111,7 +142,7 @@ def trajectory_figure(episodes: Sequence[Sequence[Trace]], names: Sequence[str])
     """
     columns = min(2, len(episodes))
     rows = -(-len(episodes) // columns)
-    figure = figure_of(6.2 * columns, 5.6 * rows)
+    figure = figure_of(6.2 * columns, (5.4 + 0.3 * len(names)) * rows + 0.5, caption)
     panels = figure.subplots(rows, columns, squeeze=False).reshape(-1)
     for axes in panels[len(episodes) :]:
         axes.set_visible(False)
@@ -120,16 +151,34 @@ def trajectory_figure(episodes: Sequence[Sequence[Trace]], names: Sequence[str])
         for index, (trace, name) in enumerate(zip(runs, names, strict=True)):
             shift = 0.06 * (index - (len(runs) - 1) / 2)
             colour = RUN_COLOURS[index % len(RUN_COLOURS)]
-            draw_walk(axes, trace, colour, f"{name}: {outcome(trace)}", shift)
+            draw_walk(axes, trace, colour, wrapped(f"{name}: {outcome(trace)}"), shift)
         axes.set_title(title_of(runs[0]), fontsize=11)
         axes.legend(
             loc="upper left", bbox_to_anchor=(0, 0), frameon=False, fontsize=9, borderaxespad=0.2
         )
+    _add_markers(figure, 5 if columns > 1 else 3)
     return figure
 
 
-def estimate_figure(trace: Trace, name: str) -> Figure:
+def _add_markers(figure: Figure, columns: int, estimate: bool = False) -> None:
+    """Add the legend of the markers above all panels."""
+    handles = marker_handles(estimate)
+    figure.legend(
+        handles=handles, loc="outside upper left", ncols=columns, frameon=False, fontsize=9
+    )
+
+
+def estimate_figure(trace: Trace, name: str, caption: str = "") -> Figure:
     """Draw the source estimate of each step and its error.
+
+    Parameters
+    ----------
+    trace : Trace
+        The episode.
+    name : str
+        Name of the run.
+    caption : str
+        World of the run, below the figure.
 
     Raises
     ------
@@ -138,10 +187,11 @@ def estimate_figure(trace: Trace, name: str) -> Figure:
     """
     if trace.source_estimates is None:
         raise ValueError("this agent has no source estimates")
-    figure = figure_of(11.5, 5.6)
+    figure = figure_of(11.5, 6.2, caption)
     left, right = figure.subplots(1, 2, width_ratios=(1.35, 1))
     draw_place(left, trace)
     draw_walk(left, trace, "#777777")
+    _add_markers(figure, 5)
     steps = np.arange(len(trace.source_estimates))
     style: dict[str, Any] = {"c": steps, "cmap": "viridis", "zorder": 8}
     lines = np.stack((trace.path, trace.source_estimates), axis=1)
@@ -149,8 +199,8 @@ def estimate_figure(trace: Trace, name: str) -> Figure:
         left.plot(*line.T, color=cmap(step / max(1, len(steps) - 1)), lw=0.5, alpha=0.5, zorder=7)
     dots = left.scatter(*trace.source_estimates.T, s=34, edgecolor="white", linewidth=0.5, **style)
     bar = figure.colorbar(dots, ax=left, orientation="horizontal", fraction=0.04, pad=0.02)
-    bar.set_label("step of the estimate")
-    left.set_title(f"{name}\n{title_of(trace)}", fontsize=10)
+    bar.set_label("step of the source estimate (dots, with a line from the agent)")
+    left.set_title(f"{wrapped(name)}\n{title_of(trace)}; {outcome(trace)}", fontsize=9)
     (x0, x1), (y0, y1) = left.get_xlim(), left.get_ylim()  # some estimates are outside
     (low_x, low_y), (high_x, high_y) = (
         trace.source_estimates.min(0) - 0.3,
@@ -164,7 +214,7 @@ def estimate_figure(trace: Trace, name: str) -> Figure:
     right.plot(steps, away, color="#777777", ls="--", label="distance from agent to source")
     right.set(xlabel="action", ylabel="metres", ylim=(0, None), xlim=(0, max(1, len(steps) - 1)))
     right.grid(alpha=0.3)
-    right.legend(frameon=False)
+    right.legend(frameon=False, loc="lower left", bbox_to_anchor=(0, 1), fontsize=9)
     return figure
 
 
@@ -192,10 +242,22 @@ def outcome(trace: Trace) -> str:
     return f"{word}, SPL {trace.record['spl']:.2f}, {len(trace.action)} actions"
 
 
-def figure_of(width: float, height: float) -> Figure:
-    """Create an empty figure, with width and height in inches, without a display."""
+def figure_of(width: float, height: float, caption: str = "") -> Figure:
+    """Create an empty figure without a display.
+
+    Parameters
+    ----------
+    width, height : float
+        Size in inches.
+    caption : str
+        Lines below the figure.
+    """
     figure = Figure(figsize=(width, height), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
+    if caption:
+        wide = int(15 * width)  # letters of this size in the width
+        lines = [part for line in caption.splitlines() for part in textwrap.wrap(line, wide)]
+        figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize=8, color="0.35")
     return figure
 
 

@@ -43,6 +43,8 @@ class Training:
         Returns the validation metrics of a network by name, including `MONITOR`.
     fingerprint : str
         Hash of all settings and data of the training, stored in checkpoints.
+    run_name : str
+        Folder of the TensorBoard events below `folder`, which names the run in TensorBoard.
 
     Attributes
     ----------
@@ -62,7 +64,9 @@ class Training:
         folder: Path,
         measure: Measure,
         fingerprint: str,
+        run_name: str = "",
     ) -> None:
+        self.run_name = run_name
         self.spec, self.network, self.folder = spec, network, folder
         self.measure, self.fingerprint = measure, fingerprint
         self._weights, _ = flatten_parameters(network)
@@ -103,7 +107,8 @@ class Training:
         bar = progress_bar(
             f"training of {self.folder.name}", updates * recipe.workers, "batches", self._batches
         )
-        with SummaryWriter(str(self.folder), purge_step=self.steps + 1) as writer, bar as advance:
+        events = SummaryWriter(str(self.folder / self.run_name), purge_step=self.steps + 1)
+        with events as writer, bar as advance:
             if not self.curve:
                 self._end_round({}, writer)
             if len(self._rounds()) < last:
@@ -163,7 +168,7 @@ class Training:
             self._write(BEST, save_network(self.network, self.fingerprint))
         for name, value in found.items():
             if name != "steps":
-                group = name if "/" in name else f"train/{name}"
+                group = name if "/" in name else f"steps/{name}"
                 writer.add_scalar(group, value, self.steps)
         writer.flush()
         shared = {key: getattr(self.shared, key).clone() for key in ("weights", "moments")}

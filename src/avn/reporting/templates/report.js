@@ -8,10 +8,10 @@
   let views = null; // read when the first episode is opened
   let shown = null;
 
-  // A click or Enter sorts by a heading, and opens a cell or an episode.
+  // Enter on a heading sorts by it, as a click does; cells and episodes have buttons.
   document.addEventListener("keydown", (event) => {
     if (event.key !== "Enter" && event.key !== " ") return;
-    if (event.target.matches("th[tabindex], td[tabindex], tr[tabindex]")) {
+    if (event.target.matches("th[tabindex]")) {
       event.preventDefault();
       event.target.click();
     }
@@ -51,7 +51,7 @@
     const opens = media !== null || run.paths;
     const mark = media !== null ? "\u266B" : opens ? "\u219D" : "";
     const tr = document.createElement("tr");
-    const texts = [mark, scene.replaceAll("_", " "), sound, number,
+    const texts = ["", scene.replaceAll("_", " "), sound, number,
       metres.toFixed(1), sight ? "in sight" : "out of sight", doors,
       outcome.replaceAll("_", " "), spl.toFixed(2), actions];
     texts.forEach((text, index) => {
@@ -63,10 +63,20 @@
     });
     tr.className = opens ? "open" : "closed";
     if (opens) {
-      tr.tabIndex = 0;
+      tr.firstChild.append(opener(mark, `open episode ${number} of ${texts[1]}, ${sound}`));
       Object.assign(tr.dataset, { media, place });
     }
     return tr;
+  }
+
+  // A button of a row; a click on the row does the same.
+  function opener(mark, label) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "opener";
+    button.textContent = mark;
+    button.setAttribute("aria-label", label);
+    return button;
   }
 
   at("episode-list").addEventListener("click", (event) => {
@@ -75,8 +85,107 @@
       const { media, place } = row.dataset;
       if (media === "null") open(path_only(Number(at("episode-list").dataset.run), Number(place)));
       else open(embedded(Number(media)));
-      at("episode").scrollIntoView({ block: "start" });
+      reveal();
     }
+  });
+
+  function reveal() {
+    at("episode").scrollIntoView({ block: "start" });
+    at("player").focus({ preventScroll: true });
+  }
+
+  // Two runs over the episodes that both have.
+  let pairs = [];
+
+  function compare() {
+    const [one, other] = [Number(at("run-a").value), Number(at("run-b").value)];
+    const found = new Map(data.runs[other].episodes.map((row) => [row[13], row]));
+    pairs = data.runs[one].episodes.filter((row) => found.has(row[13]))
+      .map((row) => [row, found.get(row[13])]);
+    // first those that one of them won, and of these the ones with trajectory, views and sound
+    const rank = ([a, b]) => 2 * (a[12] === b[12]) + (a[9] === null && b[9] === null);
+    pairs.sort((one_pair, other_pair) => rank(one_pair) - rank(other_pair));
+    const count = (a, b) => pairs.filter(([x, y]) => x[12] === a && y[12] === b).length;
+    const mean = (index) => pairs.reduce((sum, pair) => sum + pair[index][7], 0) / pairs.length;
+    const less = 100 * (mean(0) - mean(1));
+    at("compared").textContent = pairs.length
+      ? `${pairs.length} common episodes. Only A succeeds: ${count(1, 0)}. Only B: ${count(0, 1)}. `
+        + `Both: ${count(1, 1)}. Neither: ${count(0, 0)}. Mean SPL of A less that of B over the `
+        + `episodes: ${less < 0 ? "\u2212" : "+"}${Math.abs(less).toFixed(1)} points.`
+      : "These runs have no episode in common: other apartments, sounds, seeds or starts.";
+    show_pairs();
+  }
+
+  function show_pairs() {
+    const who = at("who").value;
+    const shown_pairs = pairs.map((pair, index) => [pair, index])
+      .filter(([[a, b]]) => !who || who === `${a[12]}${b[12]}`);
+    at("pairs").tBodies[0].replaceChildren(...shown_pairs.map(([pair, index]) => pair_line(pair, index)));
+    at("pairs").querySelectorAll("th").forEach((th) => th.removeAttribute("aria-sort"));
+  }
+
+  function pair_line([a, b], index) {
+    const tr = document.createElement("tr");
+    const words = (row) => row[6].replaceAll("_", " ");
+    const less = a[7] - b[7];
+    const texts = ["", a[0].replaceAll("_", " "), a[1], a[13].split(":").at(-5), a[2], a[3].toFixed(1),
+      a[4] ? "in sight" : "out of sight", words(a), words(b), a[7].toFixed(2), b[7].toFixed(2),
+      `${less < 0 ? "\u2212" : less > 0 ? "+" : ""}${Math.abs(less).toFixed(2)}`];
+    texts.forEach((text, place) => {
+      const td = document.createElement("td");
+      td.textContent = text;
+      if (![0, 1, 2, 6, 7, 8].includes(place)) td.className = "number";
+      if (place === 11) td.dataset.sort = less;
+      tr.append(td);
+    });
+    tr.children[7].classList.toggle("won", a[12] > b[12]);
+    tr.children[8].classList.toggle("won", b[12] > a[12]);
+    const runs = [at("run-a").value, at("run-b").value];
+    const opens = [a, b].some((row, place) => row[9] !== null || data.runs[runs[place]].paths);
+    tr.firstChild.dataset.sort = opens ? 0 : 1;
+    tr.className = opens ? "open" : "closed";
+    tr.dataset.pair = index;
+    if (opens) {
+      const mark = a[9] !== null || b[9] !== null ? "\u266B" : "\u219D";
+      tr.firstChild.append(opener(mark, `open episode ${a[2]} of ${texts[1]}, ${a[1]}`));
+    }
+    return tr;
+  }
+
+  function open_pair([a, b]) {
+    const runs = [Number(at("run-a").value), Number(at("run-b").value)];
+    const own = [a, b].map((row, place) => {
+      if (row[9] !== null) return embedded(row[9]);
+      return data.runs[runs[place]].paths ? path_only(runs[place], row[10]) : null;
+    });
+    const [first, second] = own[0] ? own : [own[1], null];
+    if (second) {
+      // each is the other's companion, whether embedded or a path alone
+      first.companions = [first, second];
+      second.companions = first.companions;
+    }
+    open(first);
+    reveal();
+  }
+
+  if (at("pairs")) {
+    at("run-b").value = at("run-b").options.length > 1 ? 1 : 0;
+    ["run-a", "run-b"].forEach((id) => at(id).addEventListener("change", compare));
+    at("who").addEventListener("change", show_pairs);
+    at("pairs").addEventListener("click", (event) => {
+      const row = event.target.closest("tr.open");
+      if (row) open_pair(pairs[Number(row.dataset.pair)]);
+    });
+    compare();
+  }
+
+  at("player").addEventListener("keydown", (event) => {
+    if (event.target.matches("input, audio, select") || !shown) return;
+    const last = shown.own.path.length - 1;
+    const to = { ArrowLeft: shown.step - 1, ArrowRight: shown.step + 1, Home: 0, End: last }[event.key];
+    if (to === undefined) return;
+    event.preventDefault();
+    go(to);
   });
 
   const embedded = (media) => ({ media, ...read(`episode-${media}`) });
@@ -97,12 +206,17 @@
   function open(own) {
     views = views ?? read("views");
     const plan = data.plans[own.plan];
-    shown = { own, plan, others: own.twins.filter((twin) => twin !== own.media) };
+    const others = own.companions ? own.companions.filter((other) => other !== own)
+      : own.twins.filter((twin) => twin !== own.media).map(embedded);
+    shown = { own, plan, ghosts: others };
     at("senses").classList.toggle("silent", !own.sound);
     at("episode").hidden = false;
     at("episode-title").textContent = own.title;
-    at("twins").replaceChildren(...own.twins.map(choose));
+    const all = own.companions
+      ?? own.twins.map((twin) => (twin === own.media ? own : others[own.twins.filter((t) => t !== own.media).indexOf(twin)]));
+    at("twins").replaceChildren(...all.map(choose));
     at("plan-image").src = plan.image;
+    at("plan-image").alt = `floor plan with the source and the path of ${data.runs[own.run].name}: ${own.title}`;
     at("drawing").setAttribute("viewBox", `0 0 ${plan.width} ${plan.height}`);
     at("belief-choice").hidden = !own.belief;
     shown.belief = own.belief &&
@@ -110,18 +224,16 @@
     at("step").max = own.path.length - 1;
     if (own.sound) at("sound").src = own.sound;
     else at("sound").removeAttribute("src");
-    shown.ghosts = shown.others.map(embedded);
     step(0);
   }
 
-  function choose(media) {
-    const own = media === shown.own.media ? shown.own : embedded(media);
+  function choose(own) {
     const button = document.createElement("button");
     const swatch = document.createElement("i");
     swatch.className = "swatch";
     swatch.style.background = data.runs[own.run].colour;
     button.append(swatch, `${data.runs[own.run].name}: ${own.outcome}`);
-    button.setAttribute("aria-pressed", String(media === shown.own.media));
+    button.setAttribute("aria-pressed", String(own === shown.own));
     button.addEventListener("click", () => open(own));
     return button;
   }
@@ -145,8 +257,11 @@
     const { own } = shown;
     shown.step = index;
     at("step").value = index;
-    if (own.views) at("view").src = views[own.views[index]];
     const [x, y, heading] = own.path[index];
+    if (own.views) {
+      at("view").src = views[own.views[index]];
+      at("view").alt = `view of the agent at step ${index}, facing ${HEADINGS[heading]}`;
+    }
     const last = own.path.length - 1;
     const bump = own.collided?.[index] ? ", collision" : "";
     const next = own.action && index < last ? `; next: ${ACTIONS[own.action[index]]}` : "";

@@ -1,0 +1,140 @@
+"""List of the finished runs of a folder of outputs, read from their files.
+
+Only YAML and CSV are read, so that a list of many runs takes little time: this module imports
+neither torch nor pandas.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from avn.core.errors import UserError
+
+# Columns, in order. `sort` and filters take them by these names.
+COLUMNS = (
+    *("agent", "sound", "protocol", "acoustics", "split", "subset", "episodes"),
+    *("seed", "train_seed", "success", "spl", "date", "folder"),
+)
+NUMBERS = ("seed", "train_seed", "success", "spl")
+FORMATS = ("table", "csv", "json")
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+# Names in the files that `avn.pipeline.run` writes; not imported, because that imports torch.
+_CONFIG, _RESULTS, _AVERAGE, _ALL = "config.yaml", "results.csv", "average", "all"
+
+Row = dict[str, Any]
+
+
+def run_folders(outputs: Path) -> list[Path]:
+    """Return the folders of the finished runs of a folder of outputs, in order.
+
+    Raises
+    ------
+    UserError
+        Where the folder does not exist.
+    """
+    if not outputs.is_dir():
+        raise UserError(f"outputs: there is no folder {outputs}; give that of the runs")
+    found = (outputs / "eval").glob(f"*/*/*/{_RESULTS}")
+    return sorted(path.parent for path in found if (path.parent / _CONFIG).is_file())
+
+
+def list_runs(outputs: Path) -> list[Row]:
+    """Return a row with the `COLUMNS` for each finished run; damaged runs have empty values."""
+    return [_row(folder) for folder in run_folders(outputs)]
+
+
+def check_columns(names: Iterable[str]) -> None:
+    """Raise `UserError` for a name that is no column."""
+    for name in names:
+        if name not in COLUMNS:
+            raise UserError(f"{name}: no column of the list; there are {', '.join(COLUMNS)}")
+
+
+def select(rows: Iterable[Row], filters: Mapping[str, str]) -> list[Row]:
+    """Return the rows whose columns have the given values.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        As `list_runs` gives them.
+    filters : mapping of str to str
+        Values by column; several with commas between them.
+    """
+    allowed = {key: value.split(",") for key, value in filters.items()}
+    return [row for row in rows if all(_matches(row[key], own) for key, own in allowed.items())]
+
+
+def order(rows: Iterable[Row], key: str) -> list[Row]:
+    """Return rows sorted by a column, from high to low with a minus before its name."""
+    column = key.removeprefix("-")
+    known = [row for row in rows if row[column] not in (None, "")]
+    unknown = [row for row in rows if row[column] in (None, "")]
+    return [*sorted(known, key=lambda row: row[column], reverse=key != column), *unknown]
+
+
+def as_csv(rows: Sequence[Row]) -> str:
+    """Format rows as CSV with a heading."""
+    lines = [",".join(COLUMNS)]
+    lines += [",".join(map(_quoted, (row[key] for key in COLUMNS))) for row in rows]
+    return "\n".join(lines)
+
+
+def as_json(rows: Sequence[Row]) -> str:
+    """Format rows as a JSON array of objects."""
+    return json.dumps(list(rows), indent=1)
+
+
+def _quoted(value: Any) -> str:
+    text = "" if value is None else str(value)
+    return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n\r') else text
+
+
+def _matches(value: Any, allowed: Sequence[str]) -> bool:
+    if str(value) in allowed:
+        return True
+    try:
+        return isinstance(value, int | float) and float(value) in map(float, allowed)
+    except ValueError:
+        return False
+
+
+def _row(folder: Path) -> Row:
+    cfg = _read_yaml(folder / _CONFIG)
+    row: Row = dict.fromkeys(COLUMNS, None) | _metrics(folder / _RESULTS)
+    row |= {key: _name(cfg, key) for key in ("agent", "protocol", "acoustics", "split")}
+    row |= {key: cfg.get(key) for key in ("subset", "episodes", "seed", "train_seed")}
+    sounds = cfg.get("sound")
+    row["sound"] = "+".join(map(str, sounds)) if isinstance(sounds, dict) else None
+    changed = datetime.fromtimestamp((folder / _RESULTS).stat().st_mtime, UTC)
+    return row | {"date": changed.strftime("%Y-%m-%d %H:%M"), "folder": str(folder)}
+
+
+def _name(cfg: Mapping[str, Any], group: str) -> str | None:
+    node = cfg.get(group)
+    return str(node["name"]) if isinstance(node, dict) and "name" in node else None
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    try:
+        found = yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER)
+    except (OSError, ValueError, yaml.YAMLError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _metrics(path: Path) -> Row:
+    """Return success rate and SPL over all scenes and sounds, from 0 to 1."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row["scene"] == _AVERAGE]
+        pooled = [row for row in rows if row["sound"] == _ALL] or rows
+        return {"success": float(pooled[0]["sr"]), "spl": float(pooled[0]["spl"])}
+    except (OSError, ValueError, KeyError, IndexError, TypeError):
+        return {}
