@@ -34,6 +34,7 @@ from avn.rl.a3c import A3C
 from avn.rl.environment import NavigationEnv
 from avn.rl.exploration_memory import draw_trajectories
 from avn.rl.networks import ActorCritic, NetworkSpec
+from avn.rl.observation_specs import SPECS
 from avn.rl.training import Training
 from avn.rl.worker import TrainingSpec
 
@@ -133,7 +134,7 @@ class PeerEnv(VecEnv):
         world = BatchedEpisodes(tables, build_start_sampler(tables), N, VAR, max_steps, seed=seed)
         self.env = NavigationEnv(world, names)
         boxes = {
-            name: gymnasium.spaces.Box(*self.env.features.range(name), value.shape[1:])
+            name: gymnasium.spaces.Box(SPECS[name].low, SPECS[name].high, value.shape[1:])
             for name, value in self._seen().items()
         }
         space = gymnasium.spaces.Dict(boxes)

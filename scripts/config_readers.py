@@ -14,6 +14,7 @@ from avn.config.folder import conf_folder
 from avn.core.errors import UserError
 from avn.pipeline import export
 from avn.pipeline.models import MODELS
+from avn.pipeline.observations import OBSERVATIONS
 from avn.pipeline.run import Evaluation
 from avn.pipeline.stage import Stage
 
@@ -90,6 +91,7 @@ def find_readers(keys: Mapping[str, Sequence[str]], values: Mapping[str, Sequenc
     """
     readers = Readers()
     runs = [("eval", f"agent={row}") for row in options_of("agent")]
+    runs.append(("eval", "agent=external", f"baseline.observations=[{','.join(OBSERVATIONS)}]"))
     runs += [("train", f"model={model}") for model in options_of("model")]
     unseen = {group: set(options_of(group)) for group in keys}
     kinds: dict[frozenset[str], tuple[str, ...]] = {}

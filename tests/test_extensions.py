@@ -1,6 +1,7 @@
 """Parts from outside the package: one importable file and one config file each, nothing else."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -178,3 +179,68 @@ def test_a_class_that_cannot_be_imported_is_one_line(own, command, outputs, tmp_
         assert code == 2
         assert len(err) == 1
         assert line in err[0]
+
+
+LACKING = {
+    "sound_model": ("features", "prepare"),
+    "stop_model": ("log_odds", "prepare"),
+    "occupancy_model": ("log_odds", "prepare"),
+    "mapper": ("observe", "reset"),
+    "planner": ("act", "reset"),
+    "baseline": ("act", "reset"),
+    "algorithm": ("build_loss",),
+    "protocol": ("goal_cells", "judge"),
+    "microphone": ("record",),
+    "renderer": ("prepare", "views"),
+    "backbone": ("pooled",),
+}
+
+
+@pytest.mark.parametrize("group", LACKING)
+def test_a_class_that_lacks_methods_of_its_kind_is_one_line(own, command, tmp_path, group):
+    (tmp_path / group).mkdir()
+    (tmp_path / group / "plain.yaml").write_text("_target_: own_parts.PlainModule\n")
+    where = ("--config-dir", str(tmp_path), f"outputs={tmp_path / 'outputs'}", "split=mini")
+    code, _, err = command("eval", *where, "agent=random_walk", f"{group}=plain")
+    assert code == 2
+    assert len(err) == 1
+    assert f"{group}._target_: class own_parts.PlainModule lacks" in err[0]
+    assert all(name in err[0] for name in LACKING[group])
+    assert "derive it from avn." in err[0]
+    assert not (tmp_path / "outputs").exists()
+
+
+@pytest.mark.parametrize(
+    ("target", "line"),
+    [
+        ("NoActions", "class own_parts.NoActions lacks act"),
+        ("make_agent", "make_agent is a function and no class"),
+    ],
+)
+def test_an_unfinished_class_and_a_function_are_one_line(own, command, tmp_path, target, line):
+    (tmp_path / "baseline").mkdir()
+    (tmp_path / "baseline" / "half.yaml").write_text(f"_target_: own_parts.{target}\n")
+    where = ("--config-dir", str(tmp_path), f"outputs={tmp_path}", "split=mini")
+    code, _, err = command("eval", *where, "agent=random_walk", "baseline=half")
+    assert code == 2
+    assert len(err) == 1
+    assert line in err[0]
+
+
+@pytest.mark.parametrize(
+    ("target", "line"),
+    [
+        ("SmellCritic", "agent SmellCritic needs the observation 'smell'; there are .*depth"),
+        ("WaveCritic", "agent WaveCritic needs the observation 'waveform', which is rendered"),
+    ],
+)
+def test_an_actor_critic_that_wants_what_cannot_be_is_one_line(
+    own, command, tmp_path, target, line
+):
+    (tmp_path / "baseline").mkdir()
+    (tmp_path / "baseline" / "critic.yaml").write_text(f"_target_: own_parts.{target}\n")
+    where = ("--config-dir", str(tmp_path), f"outputs={tmp_path / 'outputs'}", "split=mini")
+    code, _, err = command("train", *where, "model=a3c_v", "baseline=critic")
+    assert code == 2
+    assert len(err) == 1
+    assert re.search(line, err[0])

@@ -8,7 +8,6 @@ import pytest
 import yaml
 from small import A3C, EYES, SMALL, fitting
 
-from avn.core import sources
 from avn.reporting.finished_run import RESULTS
 
 AGENT = """
@@ -41,7 +40,6 @@ def walk(tmp_path, monkeypatch, command, outputs):
             if name in importlib.sys.modules:
                 del importlib.sys.modules[name]
         importlib.invalidate_caches()
-        sources._hash.cache_clear()
         chosen = "agent=random_walk"
         code, out, err = command(
             "eval",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from avn.core.errors import UserError
+    from avn.integrations.torchrl import make_env
     from avn.library import (
         evaluate,
         load_scene,
@@ -23,9 +24,11 @@ if TYPE_CHECKING:
     from avn.reporting.results import summarise
 
 from avn.core.caches import choose_cache_folders
+from avn.integrations.registration import register_when_imported
 
 __version__ = "0.1.0"
 choose_cache_folders()
+register_when_imported()
 
 # Module of each public name, or the module that the name stands for.
 _PUBLIC = {
@@ -34,6 +37,7 @@ _PUBLIC = {
     "evaluate": "avn.library",
     "load_scene": "avn.library",
     "load_views": "avn.library",
+    "make_env": "avn.integrations.torchrl",
     "make_simulator": "avn.library",
     "metrics": "avn.navigation.metrics",
     "render_clip": "avn.library",
@@ -46,6 +50,7 @@ __all__ = [
     "evaluate",
     "load_scene",
     "load_views",
+    "make_env",
     "make_simulator",
     "metrics",
     "render_clip",

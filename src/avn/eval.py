@@ -19,7 +19,8 @@ _FINISHED = "results.csv"
 @command("eval")
 def main(cfg: DictConfig) -> Path:
     """Evaluate an agent, or read its finished run, and print the table."""
-    simple = not (cfg.film or cfg.force)
+    # of the files that the defaults of a policy name, a record cannot know
+    simple = not (cfg.film or cfg.force or cfg.policy)
     answer = answers.recall("eval", cfg, _FINISHED) if simple else None
     if answer is None:
         folder = _evaluate(cfg)
@@ -49,7 +50,7 @@ def _evaluate(cfg: DictConfig) -> Path:
     shown = headings(cfg, default)
     show_run(run.folder, **shown)
     films.make_films(cfg, run.folder, default)
-    if not cfg.film:
+    if not (cfg.film or cfg.policy):
         answers.remember("eval", cfg, run.folder, shown)
     return run.folder
 

@@ -187,3 +187,35 @@ def test_an_agent_without_what_it_needs_is_refused(
         UserError, match="needs the observation 'source_estimate', which is not there"
     ):
         rollout_scene(Greedy(), two_rooms, episodes, protocols["var"], LABELS)
+
+
+class Says(Agent):
+    """Gives what it is told to."""
+
+    def __init__(self, actions: object) -> None:
+        self.actions = actions
+
+    def act(self, observation: TensorDict) -> Tensor:
+        return self.actions  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize(
+    ("actions", "line"),
+    [
+        (torch.zeros(36), "float32 tensor of shape .36,. on cpu; wanted an int64 tensor"),
+        (torch.full((36,), torch.nan), "float32 tensor"),
+        (torch.zeros(36, 1, dtype=torch.int64), "int64 tensor of shape .36, 1."),
+        (torch.zeros(36, dtype=torch.int64, device="meta"), "on meta"),
+        (torch.zeros(36, dtype=torch.bool), "bool tensor"),
+        (np.zeros(36, dtype=np.int64), "the actions are a ndarray"),
+        (None, "the actions are a NoneType"),
+        (torch.full((36,), 7), "7 is no action under protocol 'var', whose actions are 0 to 3"),
+        (torch.full((36,), -1), "-1 is no action"),
+        (torch.full((36,), 4), "Stop is not an action under protocol 'var'"),
+    ],
+)
+def test_actions_that_are_none_name_the_agent(corridor, protocols, actions, line) -> None:
+    episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
+    with pytest.raises(UserError, match=f"agent Says: .*{line}") as error:
+        rollout_scene(Says(actions), corridor, episodes, protocols["var"], LABELS)
+    assert "\n" not in str(error.value)

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from avn.core.sources import outside_sources, source_files
+from avn.core.sources import outside_sources, source_files, source_hash
 
 
 @pytest.fixture
@@ -84,3 +84,34 @@ def test_the_hash_follows_every_file_that_is_imported_and_no_other(folder, file,
     with (folder / file).open("a") as text:
         text.write("LATER = 1\n")
     assert (in_a_new_process() != before) == changes
+
+
+def test_weights_that_a_setting_names_belong_to_the_class(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    (folder / "weights.pt").write_bytes(b"first")
+    mine = {"_target_": "mine.Agent", "weights": "weights.pt", "more": {"list": ["weights.pt"]}}
+    ours = {"_target_": "avn.agents.greedy.Greedy", "weights": "weights.pt"}
+    first = outside_sources(mine)
+    assert set(first) == {"mine.Agent", "weights.pt"}
+    assert outside_sources(ours) == {}
+    (folder / "weights.pt").write_bytes(b"later")
+    assert outside_sources(mine)["weights.pt"] != first["weights.pt"]
+
+
+def test_a_policy_counts_as_a_class(folder):
+    assert set(
+        outside_sources({"_target_": "avn.agents.external.External", "policy": "mine:g"})
+    ) == {"mine:g"}
+
+
+def test_a_class_keeps_its_hash_until_it_is_reloaded(folder):
+    import importlib
+
+    (folder / "alone.py").write_text("class One:\n    pass\n")
+    importlib.invalidate_caches()
+    module = importlib.import_module("alone")
+    first = source_hash("alone.One")
+    (folder / "alone.py").write_text("class One:\n    size = 1\n")
+    assert source_hash("alone.One") == first
+    importlib.reload(module)
+    assert source_hash("alone.One") != first

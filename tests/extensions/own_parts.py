@@ -158,3 +158,31 @@ class Clipping(Microphone):
 
     def record(self, clips, noise):
         return super().record(clips, noise).clamp_(-self.limit, self.limit)
+
+
+class PlainModule(nn.Module):
+    """A module that is no part of any kind."""
+
+    def forward(self, values):
+        return values
+
+
+class NoActions(Agent):
+    """An agent that does not say what it does."""
+
+
+def make_agent():
+    """A function where a class is wanted."""
+    return Square()
+
+
+class SmellCritic(ActorCriticAgent):
+    """An actor-critic that wants what nobody has."""
+
+    needs = ("visual_embedding", "smell")
+
+
+class WaveCritic(ActorCriticAgent):
+    """An actor-critic that wants what no table holds."""
+
+    needs = ("visual_embedding", "waveform")

@@ -7,6 +7,7 @@ from avn.navigation.batched_episodes import BatchedEpisodes
 from avn.navigation.episodes import Episodes
 from avn.navigation.navigation_scene import draw
 from avn.navigation.protocols import Protocol
+from avn.navigation.reward import RewardConfig
 from avn.navigation.simulator import Simulator
 from avn.navigation.start_sampler import build_start_sampler
 
@@ -141,3 +142,29 @@ def test_a_world_goes_on_where_its_state_was_taken(flat, rules):
     go(world, actions[:15])
     other.load_state_dict(world.state_dict())
     assert torch.equal(go(world, actions[15:]), go(other, actions[15:]))
+
+
+@pytest.mark.parametrize("actions", [[7, 0], [-1, 0], [4, 0], [0.0, 1.0], [[0], [1]], [0]])
+def test_actions_that_are_none_are_refused(flat, rules, actions):
+    tables = random_tables([flat], rules)
+    world = BatchedEpisodes(tables, build_start_sampler(tables), 2, rules)
+    before = world.state.clone()
+    with pytest.raises(ValueError, match="action"):
+        world.step(torch.tensor(actions))
+    assert torch.equal(world.state, before)
+
+
+def test_success_is_what_the_protocol_says_and_not_a_reward(flat):
+    protocol = Protocol("stop", "radius", True, "metres")
+    tables = random_tables([flat], protocol)
+    reward = RewardConfig(success=-1.0, step=2.0)
+    world = BatchedEpisodes(
+        tables, build_start_sampler(tables), 64, protocol, reward=reward, seed=1
+    )
+    world.state = torch.arange(64) % tables.states
+    goal = tables.goal[tables.goal_row[world.source] + world.state]
+    world.step(torch.full((64,), 4))
+    assert torch.equal(world.success, goal)
+    assert 0 < int(goal.sum()) < 64
+    world.begin(torch.ones(64, dtype=torch.bool))
+    assert not world.success.any()

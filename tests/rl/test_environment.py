@@ -16,11 +16,11 @@ ALL = ("visual_embedding", "audio_embedding", "collided", "odometry", "map")
 
 
 def make_env(tables, rules, n=6, seed=0, **options) -> NavigationEnv:
-    observes = options.pop("observes", ALL)
+    observations = options.pop("observations", ALL)
     options = {"map_size": 41, "map_width": 11} | options
     return NavigationEnv(
         BatchedEpisodes(tables, build_start_sampler(tables), n, rules, 9, seed=seed),
-        observes,
+        observations,
         **options,
     )
 
@@ -45,8 +45,8 @@ def test_specs_say_shapes_and_ranges(flat, rules):
 
 def test_an_observation_that_is_not_there_is_refused_by_name(flat, rules):
     tables = random_tables([flat], rules)
-    with pytest.raises(UserError, match="observes: 'smell'"):
-        make_env(tables, rules, observes=("smell",))
+    with pytest.raises(UserError, match="observations: 'smell'"):
+        make_env(tables, rules, observations=("smell",))
 
 
 def test_only_rows_whose_episode_ended_begin_anew(flat, rules):
@@ -84,7 +84,7 @@ class Spy(TensorDictModuleBase):
 def test_a_policy_is_shown_features_and_never_a_number(flat, rules):
     tables = random_tables([flat], rules)
     env = make_env(
-        tables, rules, observes=("visual_embedding", "audio_embedding", "map"), resolved=False
+        tables, rules, observations=("visual_embedding", "audio_embedding", "map"), resolved=False
     )
     spy = Spy(["visual_embedding", "audio_embedding", "map"])
     env.rollout(5, FeatureLookup(env.features, spy), break_when_any_done=False)
@@ -133,7 +133,7 @@ def test_the_map_is_that_of_where_the_agent_has_been_and_begins_unknown(flat, ru
     tables.visual["local_patch"][:] = (
         torch.nan
     )  # nothing is seen: only what it stands on and runs into
-    env = make_env(tables, rules, n=1, observes=("map",))
+    env = make_env(tables, rules, n=1, observations=("map",))
     east, sources = 1, len(tables.source_scene)
     begins = torch.zeros(sources, dtype=torch.int64)
     env.episodes.starts = StartSampler(1, torch.tensor([4 * 2 + east]), begins, begins + 1)

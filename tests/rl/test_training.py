@@ -8,10 +8,11 @@ from small_worlds import make_spec, make_trajectories, make_worker, random_table
 from torch.nn import functional as F
 
 from avn.core.errors import UserError
+from avn.navigation.reward import RewardConfig
 from avn.rl import worker_pool
 from avn.rl.networks import ActorCritic, sample
 from avn.rl.shared import SharedState
-from avn.rl.training import BEST, LAST, Training, load_network, read_checkpoint
+from avn.rl.training import BEST, LAST, Training, best_of, load_network, read_checkpoint
 
 
 def measure(network):
@@ -214,7 +215,7 @@ def test_the_best_on_validation_is_kept(flat, rules, tmp_path):
     kept.run()
     network = ActorCritic(spec.network_spec)
     load_network(network, tmp_path / BEST, "a" * 64)
-    best = max(own["validation/spl"] for own in kept.curve)
+    best = max(own["validation/spl"] for own in kept.curve[1:])
     assert measure(network)["validation/spl"] == pytest.approx(best)
 
 
@@ -233,3 +234,44 @@ def test_several_gradients_of_a_batch_count_its_actions_once(flat, rules, tmp_pa
     again = training(twice.spec, tmp_path / "2")  # which is finished
     again.run()
     assert torch.equal(again.shared.weights, twice.shared.weights)
+
+
+@pytest.mark.parametrize(
+    ("spl", "kept"),
+    [
+        ([0.5], 0),
+        ([0.5, 0.1, 0.3, 0.2], 2),  # never the untrained one
+        ([0.0, 0.4, 0.4, 0.1], 2),  # the later of equal ones
+        ([0.0, 0.0, 0.0], 2),
+    ],
+)
+def test_the_kept_network_is_a_trained_one_and_the_latest_of_equal_ones(spl, kept):
+    curve = [{"validation/spl": value} for value in spl]
+    assert best_of(curve) is curve[kept]
+
+
+def test_the_file_is_that_of_the_kept_network(flat, rules, tmp_path):
+    spec = make_spec(random_tables([flat], rules), rules, total_steps=180, validate_every=60)
+    values, networks = iter([0.9, 0.2, 0.2, 0.1]), []
+
+    def measure(network):
+        networks.append({name: own.clone() for name, own in network.state_dict().items()})
+        return {"validation/spl": next(values)}
+
+    torch.manual_seed(0)
+    Training(spec, ActorCritic(spec.network_spec), tmp_path, measure, "a" * 64).run()
+    network = ActorCritic(spec.network_spec)
+    load_network(network, tmp_path / BEST, "a" * 64)
+    assert all(torch.equal(own, networks[2][name]) for name, own in network.state_dict().items())
+
+
+def test_the_success_of_training_episodes_is_that_of_the_environment(flat, rules):
+    reward = RewardConfig(success=-1.0, step=3.0, collision=3.0)
+    spec = make_spec(random_tables([flat], rules), rules, reward=reward, max_steps=4, num_envs=64)
+    worker = make_worker(spec)
+    batch = worker.collector.collect()
+    worker.episode_stats.update(batch)
+    ended = batch["next", "done"]
+    expected = batch["next", "terminated"][ended].float().mean()  # it ends where it succeeds
+    assert 0 < float(expected) < 1
+    assert worker.episode_stats.metrics()["success"] == pytest.approx(float(expected))

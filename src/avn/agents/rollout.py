@@ -13,7 +13,7 @@ from torch import Tensor
 
 from avn.agents.base import Agent
 from avn.apartments.floor_plan import CELL
-from avn.core.actions import HEADINGS
+from avn.core.actions import HEADINGS, action_error
 from avn.core.errors import UserError
 from avn.core.random import derive
 from avn.navigation.distances import fewest_actions
@@ -115,7 +115,8 @@ def rollout(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> N
     Raises
     ------
     UserError
-        If an observation or the exploration that the agent needs is missing.
+        If an observation or the exploration that the agent needs is missing, or its actions are
+        not an (N,) int64 tensor of actions of the protocol.
     """
     observation = simulator.reset()
     for key in sorted(set(agent.wants(simulator.protocol)) - set(observation.keys())):
@@ -138,12 +139,19 @@ def rollout(agent: Agent, simulator: Simulator, watch: Watch | None = None) -> N
     with torch.inference_mode():
         while not bool(simulator.done.all()):
             actions = agent.act(observation)
+            _check_actions(agent, simulator, actions)
             if watch and watch(simulator, agent, observation, actions):
                 return
             observation = simulator.step(actions)
             agent.set_active(~simulator.done)
     if watch:
         watch(simulator, agent, observation, None)
+
+
+def _check_actions(agent: Agent, simulator: Simulator, actions: Tensor) -> None:
+    protocol = simulator.protocol
+    if error := action_error(actions, len(simulator), protocol.actions, protocol.name):
+        raise UserError(f"agent {type(agent).__name__}: {error}")
 
 
 def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:

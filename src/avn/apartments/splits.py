@@ -15,6 +15,8 @@ from avn.core.random import derive
 
 PARTS = ("train", "validation", "test")
 FROZEN = Path(__file__).parents[1] / "assets" / "floor_plans"
+# Fields of a split that select no apartments: defaults of a training.
+DEFAULTS = ("total_steps", "validate_every")
 
 
 def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:

@@ -148,6 +148,7 @@ class CoreConfig:
     localisation: str = MISSING
     realisations: int = MISSING
     train_seed: int = MISSING
+    policy: str | None = None
     outputs: str = MISSING
     processes: int = MISSING
     auto: bool = MISSING
@@ -208,6 +209,20 @@ BASES: dict[str, type] = {
     "microphone": Option,
     "renderer": RendererConfig,
     "backbone": BackboneConfig,
+}
+# Base class of the classes of a group.
+INTERFACES = {
+    "sound_model": "avn.modules.sound_cnn.SoundCnn",
+    "stop_model": "avn.modules.stop_classifier.StopClassifier",
+    "occupancy_model": "avn.modules.occupancy_cnn.OccupancyCnn",
+    "mapper": "avn.mapping.base.Mapper",
+    "planner": "avn.agents.base.Agent",
+    "baseline": "avn.agents.base.Agent",
+    "protocol": "avn.navigation.protocols.Protocol",
+    "algorithm": "avn.rl.algorithm.Algorithm",
+    "microphone": "avn.acoustics.microphone.Microphone",
+    "renderer": "avn.views.renderer.Renderer",
+    "backbone": "avn.views.backbone.Backbone",
 }
 # Parameters that the pipeline sets and no config.
 GIVEN = {

@@ -19,9 +19,9 @@ from typing import Any
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from avn.config.schema import BASES, GIVEN, LINKED
+from avn.config.schema import BASES, GIVEN, INTERFACES, LINKED
 from avn.config.signature_table import Parameters, known_parameters
-from avn.core.classes import import_class, parameters
+from avn.core.classes import check_interface, import_class, parameters
 from avn.core.errors import UserError
 
 _PLAIN = (bool, int, float, str)
@@ -87,10 +87,14 @@ def schema_of(group: str, target: str | None) -> Any:
     Raises
     ------
     UserError
-        Where the class cannot be imported.
+        Where the class cannot be imported, or lacks methods of the base class of the group.
     """
     if target is None:
         return BASES[group]
+    if not target.startswith("avn."):  # the package's own classes need not be checked
+        option = f"{group}.{_TARGET}"
+        base = import_class(option, INTERFACES[group])
+        check_interface(option, import_class(option, target), base)
     return _signature(group, target, GIVEN.get(group, ()), BASES[group], linked=True)
 
 

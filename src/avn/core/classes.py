@@ -39,6 +39,47 @@ def import_class(option: str, target: str) -> Any:
         ) from error
 
 
+def check_interface(option: str, cls: Any, base: type) -> None:
+    """Refuse a class that lacks methods of the base class of its kind.
+
+    Parameters
+    ----------
+    option : str
+        Key of the config that names the class, for the message.
+    cls : object
+        What was imported.
+    base : type
+        Base class of the kind. `cls` need not be derived from it.
+
+    Raises
+    ------
+    UserError
+        If `cls` is no class, lacks a public method of `base`, or leaves one abstract.
+    """
+    advice = f"derive it from {base.__module__}.{base.__qualname__}"
+    if not isinstance(cls, type):
+        what = getattr(cls, "__qualname__", repr(cls))
+        raise UserError(f"{option}: {what} is a {type(cls).__name__} and no class; {advice}")
+    package = __name__.split(".")[0]
+    owners = [owner for owner in base.__mro__ if owner.__module__.split(".")[0] == package]
+    methods = {
+        name
+        for owner in owners
+        for name, value in vars(owner).items()
+        if not name.startswith("_")
+        and (callable(value) or isinstance(value, property | classmethod | staticmethod))
+    }
+    missing = sorted(
+        {name for name in methods if not hasattr(cls, name)}
+        | set(getattr(cls, "__abstractmethods__", ()))
+    )
+    if missing:
+        raise UserError(
+            f"{option}: class {cls.__module__}.{cls.__qualname__} lacks {', '.join(missing)}; "
+            f"{advice}{'' if not issubclass(cls, base) else ' and define them'}"
+        )
+
+
 def parameters(cls: type) -> dict[str, tuple[Any, Any]]:
     """Return the type and default of each parameter of a class, by name.
 

@@ -10,20 +10,29 @@ from __future__ import annotations
 import ast
 import hashlib
 import importlib.util
+import sys
 import sysconfig
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import Any
 
-TARGET = "_target_"
+from avn.core.hashing import file_hash
+
+# Keys whose values name a class, as `module.name`, or a policy of the user, as `module:name`.
+TARGET, POLICY = "_target_", "policy"
 # Packages whose classes stand in the options of the package itself.
 _VERSIONED = ("avn", "torch")
+# Classes as they were imported, or None, and their hashes.
+_known: dict[str, tuple[Any, str]] = {}
 
 
 def outside_sources(node: Any) -> dict[str, str]:
-    """Return the hash of the sources of each class from outside that a node names.
+    """Return the hashes of what each class from outside that a node names is made of.
+
+    They are those of its source files, see `source_files`, and those of the files that its settings
+    name, such as weights.
 
     Parameters
     ----------
@@ -33,36 +42,52 @@ def outside_sources(node: Any) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        SHA-256, in hex, by the value of `_target_`.
+        SHA-256, in hex, by the name of the class, or by the path of the file. A policy
+        `module:name` counts as a class.
     """
-    targets = sorted(set(_targets(node)))
-    return {name: source_hash(name) for name in targets if _top(name) not in _VERSIONED}
+    return dict(sorted(_hashes(node)))
 
 
-def _targets(node: Any) -> Iterator[str]:
+def _hashes(node: Any) -> Iterator[tuple[str, str]]:
     if isinstance(node, dict):
-        if isinstance(target := node.get(TARGET), str):
-            yield target
+        for key in (TARGET, POLICY):
+            name = node.get(key)
+            if isinstance(name, str) and _top(name) not in _VERSIONED:
+                yield name, source_hash(name.replace(":", "."))
+                yield from ((own, file_hash(Path(own))) for own in _files(node))
         node = list(node.values())
     if isinstance(node, list | tuple):
         for child in node:
-            yield from _targets(child)
+            yield from _hashes(child)
+
+
+def _files(node: Any) -> Iterator[str]:
+    """Yield the texts below a node that are paths of files."""
+    if isinstance(node, str):
+        with suppress(OSError, ValueError):  # too long, or no path at all
+            if node and Path(node).is_file():
+                yield node
+    children = node.values() if isinstance(node, dict) else node
+    for child in children if isinstance(children, Iterable) and not isinstance(node, str) else ():
+        yield from _files(child)
 
 
 def source_hash(target: str) -> str:
     """Compute the SHA-256, in hex, of the source files of a class; see `source_files`.
 
-    The files are read once in a process, since a class is imported once.
+    A class that is imported keeps its hash in this process, since a later edit does not change it;
+    one that is reloaded has another.
     """
-    return _hash(target.rpartition(".")[0])
-
-
-@cache
-def _hash(module: str) -> str:
-    total = hashlib.sha256()
-    for name, path in source_files(module).items():
-        total.update(f"{name}:{hashlib.sha256(path.read_bytes()).hexdigest()};".encode())
-    return total.hexdigest()
+    module, _, name = target.rpartition(".")
+    loaded = getattr(sys.modules.get(module), name, None)
+    before, known = _known.get(target, (None, ""))
+    if not known or before is not loaded:
+        total = hashlib.sha256()
+        for own, path in source_files(module).items():
+            total.update(f"{own}:{hashlib.sha256(path.read_bytes()).hexdigest()};".encode())
+        known = total.hexdigest()
+        _known[target] = (loaded, known)
+    return known
 
 
 def source_files(module: str) -> dict[str, Path]:

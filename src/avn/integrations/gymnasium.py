@@ -1,38 +1,54 @@
-"""Environments for Gymnasium; `import avn.rl` registers them as "avn/Walk-v0"."""
+"""Environment of Gymnasium with one agent, and the functions behind "avn/Walk-v0".
+
+`import avn` registers the environment, and `gymnasium.make("avn:avn/Walk-v0")` imports it. Actions
+are those of `avn.core.actions`. An observation is a dict with an array for each name:
+
+| name | shape, type | meaning |
+| --- | --- | --- |
+| `view` | (H, W, 3) uint8 | picture of the camera, sRGB |
+| `depth` | (H, W) float32 | metres; 0 where there is no surface |
+| `visual_embedding` | (D,) float32 | output of the backbone for the view |
+| `local_patch` | (5, 5) float32 | probability that cells ahead are free; 0.5 where unknown |
+| `map` | (1, W, W) float32 | occupancy map around the agent, 0.5 where unknown |
+| `waveform` | (2, rate) float32 | one second of sound at the left and the right ear |
+| `spectrogram` | (channels, bands, frames) float32 | spectrogram of that second |
+| `audio_embedding` | (D,) float32 | output of the sound network |
+| `source_estimate` | (2,) float32 | estimated location of the source, metres right and front |
+| `stop_probability` | (1,) float32 | probability that the agent is at the goal |
+| `odometry` | (3,) int64 | cells right, cells front and quarter turns since the start |
+| `collided` | (1,) int8 | 1 if the last action was a blocked move |
+
+The bounds of the space are constants (`avn.rl.observation_specs`), the same for every apartment and
+every network.
+
+An info has `success`, `spl`, `distance_to_goal` (metres along the shortest path to the source),
+`collisions`, `scene` and `sound`, and `episode`, the number in the list, if `part="test"`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
-from hydra import compose, initialize_config_dir
-from hydra.core.global_hydra import GlobalHydra
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from torch import Tensor
 
-from avn.config import registry
-from avn.config.folder import conf_folder
-from avn.core.classes import build_object
 from avn.core.errors import UserError
-from avn.navigation.batched_episodes import BatchedEpisodes
-from avn.navigation.protocols import Protocol
-from avn.navigation.scene_batch import SceneBatch
-from avn.navigation.start_sampler import build_start_sampler
-from avn.pipeline import policy, policy_data
-from avn.pipeline.occupancy import has_occupancy_model
-from avn.pipeline.sound_network import has_sound_model
-from avn.pipeline.stage import build
-from avn.rl.algorithm import Algorithm
-from avn.rl.environment import NavigationEnv
+from avn.integrations.gymnasium_vector import NavigationVectorEnv
+from avn.integrations.render import FPS, RENDER_MODES, check_render_mode
+from avn.integrations.running import RunningEpisodes
+from avn.integrations.spaces import Observation, as_actions, observation_space
+from avn.integrations.world import OF_ALGORITHM, MaxSteps, World, open_world
 
-Observation = dict[str, NDArray[Any]]
+_OPTIONS = ("overrides", "part", "observations", "max_steps", "render_mode")
+
+
+class UnknownOptionError(UserError, TypeError):
+    """Argument that the environment does not have; a TypeError, as callers in Python expect."""
 
 
 class NavigationGymEnv(gymnasium.Env[Observation, int]):
@@ -40,119 +56,122 @@ class NavigationGymEnv(gymnasium.Env[Observation, int]):
 
     Parameters
     ----------
-    episodes : BatchedEpisodes
-        Batch of one episode.
-    observes : sequence of str
-        Names of the observations; see `avn.rl.environment.NavigationEnv`.
+    world : World
+        Apartments and observations.
+    max_steps : int, "algorithm" or None
+        See `make_env`.
+    render_mode : {None, "rgb_array"}
+        Mode of `render`.
     """
 
-    def __init__(self, episodes: BatchedEpisodes, observes: Sequence[str]) -> None:
-        self.metadata = {"render_modes": []}
-        self._env = NavigationEnv(episodes, observes)
-        self.observation_space: spaces.Space[Any] = _space(self._env)
-        self.action_space: spaces.Space[Any] = spaces.Discrete(episodes.protocol.actions)
+    metadata: dict[str, Any] = {"render_modes": [*RENDER_MODES], "render_fps": FPS}  # noqa: RUF012
+
+    def __init__(
+        self, world: World, max_steps: MaxSteps = OF_ALGORITHM, render_mode: str | None = None
+    ) -> None:
+        self._running = RunningEpisodes(world, 1, max_steps)
+        self.render_mode = render_mode
+        self.observation_space: spaces.Space[Any] = observation_space(self._running.env)
+        self.action_space: spaces.Space[Any] = spaces.Discrete(self._running.actions)
+        self._is_over = True
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin a new episode. See `gymnasium.Env.reset`."""
+        """Begin a new episode. See `gymnasium.Env.reset`.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Seed of this episode and of those that follow.
+        options : dict, optional
+            `scene`, `source`, `start` and `sound` of the episode; see
+            `avn.integrations.episode_options.place`.
+        """
         super().reset(seed=seed)
         if seed is not None:
-            self._env.set_seed(seed)
-        self._env.begin(torch.ones(1, dtype=torch.bool))
-        return self._seen(), {}
+            self._running.env.episodes.seed(seed)
+        self._running.begin(torch.ones(1, dtype=torch.bool), options)
+        self._is_over = False
+        return self._observation(), self._info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Take one action. See `gymnasium.Env.step`."""
-        outcome = self._env.move(torch.tensor([int(action)]))
-        reward, terminated, truncated = (value.item() for value in outcome)
-        return self._seen(), float(reward), bool(terminated), bool(truncated), {}
+        count = self._running.actions
+        if np.shape(action) != ():
+            raise ValueError(f"action: {action!r}; give an integer from 0 to {count - 1}")
+        actions = as_actions([action], 1, count)
+        if self._is_over:
+            raise UserError("step: there is no running episode; call reset first")
+        reward, terminated, truncated = (value.item() for value in self._running.move(actions))
+        self._is_over = terminated or truncated
+        return self._observation(), reward, terminated, truncated, self._info()
 
-    def _seen(self) -> Observation:
-        return {name: value[0] for name, value in _arrays(self._env).items()}
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """Return the view and the map, (400, 800, 3) uint8; None without a render mode."""
+        return None if self.render_mode is None else self._running.picture(0)
 
+    def _observation(self) -> Observation:
+        return {name: value[0] for name, value in self._running.observations().items()}
 
-class NavigationVectorEnv(VectorEnv[Observation, NDArray[Any], NDArray[Any]]):
-    """Gymnasium environment with N agents; episodes reset in the step in which they end.
-
-    Parameters
-    ----------
-    episodes : BatchedEpisodes
-        Batch of N episodes.
-    observes : sequence of str
-        Names of the observations; see `avn.rl.environment.NavigationEnv`.
-    """
-
-    def __init__(self, episodes: BatchedEpisodes, observes: Sequence[str]) -> None:
-        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
-        self._env, self.num_envs = NavigationEnv(episodes, observes), episodes.n
-        self.single_observation_space = _space(self._env)
-        self.single_action_space = spaces.Discrete(episodes.protocol.actions)
-        self.observation_space = batch_space(self.single_observation_space, episodes.n)
-        self.action_space = batch_space(self.single_action_space, episodes.n)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Begin new episodes. See `gymnasium.vector.VectorEnv.reset`."""
-        super().reset(seed=seed)
-        if seed is not None:
-            self._env.set_seed(seed)
-        self._env.begin(torch.ones(self.num_envs, dtype=torch.bool))
-        return _arrays(self._env), {}
-
-    def step(
-        self, actions: NDArray[Any]
-    ) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Take one action in each episode. See `gymnasium.vector.VectorEnv.step`."""
-        outcome = self._env.move(torch.as_tensor(actions, dtype=torch.int64))
-        reward, terminated, truncated = (value.numpy() for value in outcome)
-        done, info = terminated | truncated, {}
-        if done.any():
-            info = {"final_obs": _arrays(self._env), "_final_obs": done}
-            self._env.begin(torch.from_numpy(done))
-        return _arrays(self._env), reward.astype(np.float64), terminated, truncated, info
+    def _info(self) -> dict[str, Any]:
+        values = {name: value[0] for name, value in self._running.infos().items()}
+        return {k: v.item() if isinstance(v, np.generic) else v for k, v in values.items()}
 
 
 def make_env(
     overrides: Sequence[str] = (),
     part: str = "train",
-    observes: Sequence[str] | None = None,
-    max_steps: int | None = 200,
-    **_: Any,
+    observations: Sequence[str] | None = None,
+    max_steps: MaxSteps = OF_ALGORITHM,
+    render_mode: str | None = None,
+    **unknown: Any,
 ) -> NavigationGymEnv:
     """Make an environment with one agent in the apartments of a config.
 
     Parameters
     ----------
     overrides : sequence of str
-        Overrides of `python -m avn.train model=a3c_va`, such as `split=mini`.
-    part : {"train", "validation"}
-        Part of the split whose apartments are used.
-    observes : sequence of str, optional
-        Names of the observations; those of the model by default.
-    max_steps : int or None
-        Actions after which an episode is truncated; None for the limits of the protocol.
+        Settings of `avn.eval agent=external`, such as `split=mini`. A row of the table,
+        `agent=a3c_va` or `model=a3c_va`, selects the observations of its agent.
+    part : {"train", "validation", "test"}
+        Part of the split. "train" and "validation" draw episodes in the apartments of the training
+        world. "test" plays the episodes of `avn.eval` in their order, and then again.
+    observations : sequence of str, optional
+        Names of the observations; see the module.
+    max_steps : int, "algorithm" or None
+        Actions after which an episode is truncated: a number, that of `algorithm.max_steps`, or the
+        limits of the protocol alone.
+    render_mode : {None, "rgb_array"}
+        "rgb_array" for pictures of the view and the map.
+    **unknown
+        Refused.
 
     Returns
     -------
     NavigationGymEnv
+        Two environments have different episodes, unless they are seeded.
 
     Raises
     ------
     UserError
-        If a setting is not valid.
+        If a setting is not valid, or the environment does not read it.
     """
-    return NavigationGymEnv(*_episodes(tuple(overrides), part, 1, observes, max_steps))
+    _refuse(unknown, _OPTIONS)
+    check_render_mode(render_mode)
+    world = open_world(overrides, part, observations, max_steps, render_mode is not None)
+    return NavigationGymEnv(world, max_steps, render_mode)
 
 
 def make_vector_env(
     num_envs: int = 1,
     overrides: Sequence[str] = (),
     part: str = "train",
-    observes: Sequence[str] | None = None,
-    max_steps: int | None = 200,
-    **_: Any,
+    observations: Sequence[str] | None = None,
+    max_steps: MaxSteps = OF_ALGORITHM,
+    render_mode: str | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+    **unknown: Any,
 ) -> NavigationVectorEnv:
     """Make an environment with N agents in the apartments of a config.
 
@@ -160,81 +179,34 @@ def make_vector_env(
     ----------
     num_envs : int
         N, number of agents.
-    overrides, part, observes, max_steps
+    overrides, part, observations, max_steps, render_mode
         See `make_env`.
+    autoreset_mode : AutoresetMode
+        When an episode that has ended begins anew: in the same step, in the next one, or by `reset`
+        with `options={"reset_mask": mask}` alone.
+    **unknown
+        Refused.
 
     Returns
     -------
     NavigationVectorEnv
     """
-    return NavigationVectorEnv(*_episodes(tuple(overrides), part, num_envs, observes, max_steps))
+    _refuse(unknown, ("num_envs", *_OPTIONS, "autoreset_mode"))
+    check_render_mode(render_mode)
+    check_num_envs(num_envs)
+    world = open_world(overrides, part, observations, max_steps, render_mode is not None)
+    return NavigationVectorEnv(world, num_envs, max_steps, render_mode, autoreset_mode)
 
 
-def _episodes(
-    overrides: tuple[str, ...],
-    part: str,
-    n: int,
-    observes: Sequence[str] | None,
-    max_steps: int | None,
-) -> tuple[BatchedEpisodes, Sequence[str]]:
-    tables, default, protocol, recipe = _tables(overrides, part)
-    starts = build_start_sampler(tables)
-    episodes = BatchedEpisodes(
-        tables, starts, n, protocol, max_steps, recipe.reward, recipe.train_seed
-    )
-    return episodes, observes or default
+def check_num_envs(num_envs: Any) -> None:
+    """Raise `UserError` for a number of agents below 1."""
+    if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
+        raise UserError(f"num_envs: {num_envs!r}; give 1 or more")
 
 
-@lru_cache(maxsize=4)
-def _tables(
-    overrides: tuple[str, ...], part: str
-) -> tuple[SceneBatch, tuple[str, ...], Protocol, Algorithm]:
-    # the environments of one process share the tables
-    cfg = _config(overrides)
-    if part not in policy_data.SUBSETS:
-        raise UserError(f"part: '{part}' is none of {', '.join(policy_data.SUBSETS)}")
-    for stage in policy_data.subset_stages(cfg, part):
-        build(stage)
-    tables = policy_data.tables_of(cfg, policy_data.load_subset(cfg, part))
-    heard = ("audio_embedding",) if has_sound_model(cfg) else ()
-    names = ("visual_embedding", *heard, *(("map",) if has_occupancy_model(cfg) else ()))
-    return tables, names, build_object("protocol", cfg.protocol), policy.build_algorithm(cfg)
-
-
-def _config(overrides: tuple[str, ...]) -> Any:
-    """Compose the config of `avn.train`, also within a command of Hydra."""
-    registry.register()
-    chosen = [*([] if any(o.startswith("model=") for o in overrides) else ["model=a3c_va"])]
-    if GlobalHydra.instance().is_initialized():
-        return compose("train", overrides=[*chosen, *overrides])
-    with initialize_config_dir(str(conf_folder().resolve()), version_base="1.3"):
-        return compose("train", overrides=[*chosen, *overrides])
-
-
-def _arrays(env: NavigationEnv) -> Observation:
-    seen = env.observation()
-    shown = env.features(seen["state"], seen["clip"])
-    shown |= {name: seen[name] for name in env.observes if name in seen}
-    return {name: _array(shown[name]) for name in env.observes}
-
-
-def _array(value: Tensor) -> NDArray[Any]:
-    if value.dtype == torch.bool:
-        return value.numpy().astype(np.int8)[:, None]
-    return value.float().numpy() if value.dtype == torch.float16 else value.numpy()
-
-
-def _space(env: NavigationEnv) -> spaces.Dict:
-    """Return the observation space of one agent."""
-    own: dict[str, spaces.Space[Any]] = {}
-    for name, value in _arrays(env).items():
-        if name in _RANGES:
-            low, high = _RANGES[name]
-        else:
-            low, high = env.features.range(name)
-        own[name] = spaces.Box(low, high, value.shape[1:], value.dtype.type)
-    return spaces.Dict(own)
-
-
-# Odometry counts cells; the bound is more than any apartment has.
-_RANGES = {"map": (0.0, 1.0), "collided": (0, 1), "odometry": (-10_000, 10_000)}
+def _refuse(unknown: dict[str, Any], known: Sequence[str]) -> None:
+    for name, value in unknown.items():
+        raise UnknownOptionError(
+            f"unexpected keyword argument '{name}': not an option of the environment; there are "
+            f"{', '.join(known)}, and settings are given as overrides=['{name}={value}']"
+        )

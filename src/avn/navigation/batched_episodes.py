@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from avn.core.actions import BACKWARD
+from avn.core.actions import BACKWARD, action_error
 from avn.core.clip_id import ClipId
 from avn.navigation.protocols import Protocol
 from avn.navigation.reward import RewardConfig
@@ -24,6 +24,7 @@ _KEPT = (
     "actions",
     "attempted",
     "collided",
+    "success",
 )
 
 
@@ -57,6 +58,8 @@ class BatchedEpisodes:
         Actions and attempted moves in the episode.
     collided : (N,) bool
         True if the last action was a blocked move.
+    success : (N,) bool
+        True if the last action ended the episode with success.
     """
 
     def __init__(
@@ -77,7 +80,7 @@ class BatchedEpisodes:
             torch.zeros(n, dtype=torch.int64) for _ in range(6)
         )
         self.actions, self.attempted = (torch.zeros(n, dtype=torch.int64) for _ in range(2))
-        self.collided = torch.zeros(n, dtype=torch.bool)
+        self.collided, self.success = (torch.zeros(n, dtype=torch.bool) for _ in range(2))
         self.begin(torch.ones(n, dtype=torch.bool))
 
     def begin(self, rows: Tensor) -> None:
@@ -100,10 +103,43 @@ class BatchedEpisodes:
         self.start = torch.where(rows, start, self.start)
         self.state = torch.where(rows, start, self.state)
         self.sound = torch.where(rows, sound, self.sound)
+        self._clear(rows)
+        self._draw_realisations(rows)
+
+    def place(
+        self,
+        rows: Tensor,
+        source: Tensor | None = None,
+        start: Tensor | None = None,
+        sound: Tensor | None = None,
+    ) -> None:
+        """Set source, start and sound of episodes that have just begun.
+
+        Parameters
+        ----------
+        rows : (N,) bool
+            Rows to change.
+        source, start, sound : (N,) int64, optional
+            Source, first state and sound of each row; what is None stays as it was drawn. With a
+            source and no start, a start away from that source is drawn.
+        """
+        if source is not None:
+            self.source = torch.where(rows, source, self.source)
+            if start is None:
+                start = self.starts.draw_starts(self.source, self.generator)
+            first = self.tables.source_scene[self.source] * self.starts.trajectories
+            self.trajectory_index = torch.where(rows, first, self.trajectory_index)
+        if start is not None:
+            self.start = torch.where(rows, start, self.start)
+            self.state = torch.where(rows, start, self.state)
+        if sound is not None:
+            self.sound = torch.where(rows, sound, self.sound)
+
+    def _clear(self, rows: Tensor) -> None:
+        """Set the counts of some rows to those of a new episode."""
         self.actions = self.actions.masked_fill(rows, 0)
         self.attempted = self.attempted.masked_fill(rows, 0)
-        self.collided = self.collided & ~rows
-        self._draw_realisations(rows)
+        self.collided, self.success = self.collided & ~rows, self.success & ~rows
 
     def step(self, actions: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Move every agent by one action.
@@ -118,20 +154,36 @@ class BatchedEpisodes:
         reward : (N,) float32
         terminated, truncated : (N,) bool
             Episodes that ended under the protocol, and episodes that a limit cut off.
+
+        Raises
+        ------
+        ValueError
+            If the actions are not an (N,) int64 tensor of actions of the protocol.
         """
+        error = action_error(actions, self.n, self.protocol.actions, self.protocol.name)
+        if error:
+            raise ValueError(error)
         found = advance(self.tables, self.tables.goal_row[self.source], self.state, actions)
         self.state, self.collided, arrived = found
         self.actions = self.actions + 1
         self.attempted = self.attempted + (actions <= BACKWARD)
-        success, terminated = self.protocol.judge(actions, arrived)
+        self.success, terminated = self.protocol.judge(actions, arrived)
         self._draw_realisations()
         truncated = self._out_of_time() & ~terminated
         reward = torch.where(self.collided, self.reward.collision, self.reward.step)
-        return torch.where(success, self.reward.success, reward), terminated, truncated
+        return torch.where(self.success, self.reward.success, reward), terminated, truncated
+
+    def clip_id(self) -> ClipId:
+        """Return the clip that each agent hears now."""
+        return ClipId(self.source, self.state, self.sound, self.realisation)
 
     def clip(self) -> Tensor:
         """Return the row of the clip that each agent hears now, (N,) int64."""
-        return self.tables.clip(ClipId(self.source, self.state, self.sound, self.realisation))
+        return self.tables.clip(self.clip_id())
+
+    def seed(self, seed: int) -> None:
+        """Set the seed of the episodes that begin from now on."""
+        self.generator.manual_seed(seed)
 
     def odometry(self) -> Tensor:
         """Return cells right, cells forward and quarter turns since the start, (N, 3) int64."""
@@ -145,7 +197,8 @@ class BatchedEpisodes:
     def load_state_dict(self, kept: dict[str, Any]) -> None:
         """Restore what `state_dict` returned."""
         for name in _KEPT:
-            setattr(self, name, kept[name].clone())
+            if name in kept:  # checkpoints of earlier versions lack `success`
+                setattr(self, name, kept[name].clone())
         self.generator.set_state(kept["generator"])
 
     def _draw_realisations(self, rows: Tensor | None = None) -> None:

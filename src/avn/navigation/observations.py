@@ -4,8 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from torch import Tensor
+
+from avn.core.clip_id import ClipId
+
+
+class RenderedAudio(Protocol):
+    """Audio observation of an apartment that is rendered when an agent hears it.
+
+    Attributes
+    ----------
+    sounds, realisations : int
+        Number of sounds, and of realisations of each clip.
+    """
+
+    @property
+    def sounds(self) -> int:
+        """Number of sounds."""
+
+    @property
+    def realisations(self) -> int:
+        """Number of realisations of each clip."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the observation of one clip."""
+
+    def __call__(self, clip: ClipId) -> Tensor:
+        """Render N clips, (N, ...) float32; sources and states are those of the apartment."""
 
 
 @dataclass(frozen=True)
@@ -18,20 +46,25 @@ class SceneObservations:
         Features or estimates of each clip.
     visual : mapping of str to (S, ...) tensor
         Features or local patches of the view of each state.
+    rendered : mapping of str to RenderedAudio
+        Audio observations that are too large for a tensor of all clips, such as waveforms.
     """
 
     audio: Mapping[str, Tensor] = field(default_factory=dict)
     visual: Mapping[str, Tensor] = field(default_factory=dict)
+    rendered: Mapping[str, RenderedAudio] = field(default_factory=dict)
 
     @property
     def sounds(self) -> int | None:
         """Number of sounds; None without audio observations."""
-        return next((heard.shape[2] for heard in self.audio.values()), None)
+        known = [heard.shape[2] for heard in self.audio.values()]
+        return next(iter([*known, *(each.sounds for each in self.rendered.values())]), None)
 
     @property
     def realisations(self) -> int:
         """Number of realisations of each clip; 1 without audio observations."""
-        return next((heard.shape[3] for heard in self.audio.values()), 1)
+        known = [heard.shape[3] for heard in self.audio.values()]
+        return next(iter([*known, *(each.realisations for each in self.rendered.values())]), 1)
 
     def check(self, sources: int, states: int, sounds: int) -> None:
         """Check the shapes of all tensors.

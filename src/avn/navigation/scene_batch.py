@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -14,7 +14,7 @@ from avn.core.actions import ACTIONS, BACKWARD, HEADINGS, transitions
 from avn.core.clip_id import ClipId
 from avn.navigation.distances import measure
 from avn.navigation.navigation_scene import NavigationScene
-from avn.navigation.observations import SceneObservations
+from avn.navigation.observations import RenderedAudio, SceneObservations
 from avn.navigation.protocols import Protocol
 
 # Unit vectors (east, north) to the right and to the front of headings north, east, south, west.
@@ -47,12 +47,16 @@ class SceneBatch:
         Row of the first clip of each source; see `clip`.
     sounds, realisations : int
         Number of sounds, and of realisations of each clip.
+    shortest : (...,) float64
+        The l of SPL from each state, in the layout of `goal`; see `Distances`.
     poses : (4 * S, 3) int64
         See `relative_poses`.
     audio : dict of str to (clips, ...) tensor
         Audio observations of all clips, by name.
     visual : dict of str to (S, ...) tensor
         Visual observations of all states, by name.
+    rendered : dict of str to list of RenderedAudio
+        Audio observations that are rendered when they are heard, for each apartment, by name.
     """
 
     following: Tensor
@@ -62,12 +66,14 @@ class SceneBatch:
     goal: Tensor
     goal_row: Tensor
     moves: Tensor
+    shortest: Tensor
     clip_row: Tensor
     sounds: int
     realisations: int
     poses: Tensor
     audio: dict[str, Tensor]
     visual: dict[str, Tensor]
+    rendered: dict[str, list[RenderedAudio]] = field(default_factory=dict)
 
     @property
     def states(self) -> int:
@@ -88,6 +94,42 @@ class SceneBatch:
         """Return the rows of clips in the tensors of `audio`, (N,) int64."""
         first = self.clip_row[clip.source] + clip.state * self.clips_of_state
         return first + clip.sound * self.realisations + clip.realisation
+
+    def first_source(self) -> Tensor:
+        """Return the number of the first source of each apartment, (R,) int64."""
+        return torch.searchsorted(self.source_scene, torch.arange(len(self.first_state) - 1))
+
+    def render(self, clip: ClipId, wanted: Tensor | None = None) -> dict[str, Tensor]:
+        """Render the audio observations that are in no table.
+
+        Parameters
+        ----------
+        clip : ClipId
+            Clips of N agents.
+        wanted : (N,) bool tensor, optional
+            Agents that hear; the observations of the others are 0.
+
+        Returns
+        -------
+        dict of str to (N, ...) float32 tensor
+        """
+        if not self.rendered:
+            return {}
+        scene = self.source_scene[clip.source]
+        found = {
+            name: torch.zeros(len(scene), *each[0].shape) for name, each in self.rendered.items()
+        }
+        first_source = self.first_source()
+        for number in range(len(self.first_state) - 1):
+            here = (scene == number) if wanted is None else (scene == number) & wanted
+            rows = here.nonzero()[:, 0]
+            if len(rows):
+                source, state, *others = (part[rows] for part in clip)
+                local = source - first_source[number], state - self.first_state[number]
+                own = ClipId(*local, *others)
+                for name, each in self.rendered.items():
+                    found[name][rows] = each[number](own)
+        return found
 
     def origin(self, start: Tensor) -> tuple[Tensor, Tensor]:
         """Return the first row of `poses` in the frame of each start, and the pose of the start."""
@@ -192,6 +234,7 @@ def build_scene_batch(
         goal=_by_state([d.goal for d in distances]),
         goal_row=row,
         moves=_by_state([d.source_moves for d in distances]),
+        shortest=_by_state([d.shortest for d in distances]),
         clip_row=row * sounds * realisations,
         sounds=sounds,
         realisations=realisations,
@@ -203,6 +246,7 @@ def build_scene_batch(
         visual={
             name: _joined([own.visual[name] for own in observed]) for name in observed[0].visual
         },
+        rendered={name: [own.rendered[name] for own in observed] for name in observed[0].rendered},
     )
 
 

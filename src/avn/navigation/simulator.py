@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from avn.core.actions import BACKWARD, STOP
+from avn.core.actions import BACKWARD, action_error
 from avn.core.clip_id import ClipId
 from avn.core.random import scramble
 from avn.navigation.distances import Distances, measure
@@ -149,14 +149,17 @@ class Simulator:
             `collided` (N,) bool, True if the last action was a blocked move; `odometry` (N, 3)
             int64, cells to the right, cells to the front and quarter turns clockwise since the
             start, in the frame of the start; and the audio and visual observations by name.
+            Audio that is rendered when it is heard is 0 in finished episodes.
         """
         from tensordict import TensorDict
 
         odometry = self.tables.odometry(self.start, self.state, self._origin)
         observation = {"collided": self._collided.clone(), "odometry": odometry}
-        if self.tables.audio:
-            clip = self.tables.clip(self.clip())
-            observation |= {name: heard[clip] for name, heard in self.tables.audio.items()}
+        if self.tables.audio or self.tables.rendered:
+            heard = self.clip()
+            row = self.tables.clip(heard)
+            observation |= {name: table[row] for name, table in self.tables.audio.items()}
+            observation |= self.tables.render(heard, ~self.done)
         observation |= {name: seen[self.state] for name, seen in self.tables.visual.items()}
         return TensorDict(observation, batch_size=[len(self)])
 
@@ -199,18 +202,9 @@ class Simulator:
         return drawn_realisations(self.episodes, draws, self.tables.realisations).reshape(-1)
 
     def _check(self, actions: Tensor) -> None:
-        if actions.shape != self.state.shape or actions.dtype != torch.int64:
-            raise ValueError(
-                f"actions are {tuple(actions.shape)} {actions.dtype}; wanted ({len(self)},) int64"
-            )
-        low, high = (int(end) for end in torch.aminmax(actions))
-        if low < 0 or high >= self.protocol.actions:
-            action = low if low < 0 else high
-            what = "Stop is not an action" if action == STOP else f"{action} is no action"
-            raise ValueError(
-                f"{what} under protocol '{self.protocol.name}', whose actions are "
-                f"0 to {self.protocol.actions - 1}"
-            )
+        error = action_error(actions, len(self), self.protocol.actions, self.protocol.name)
+        if error:
+            raise ValueError(error)
 
 
 def drawn_realisations(

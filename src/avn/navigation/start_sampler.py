@@ -48,8 +48,15 @@ class StartSampler:
         source = torch.randint(len(self.first) // self.trajectories, (n,), generator=generator)
         trajectory_index = torch.randint(self.trajectories, (n,), generator=generator)
         which = source * self.trajectories + trajectory_index
-        index = (torch.rand(n, generator=generator) * self.count[which]).long()
-        return source, trajectory_index, self.states[self.first[which] + index]
+        return source, trajectory_index, self._draw_from(which, generator)
+
+    def draw_starts(self, source: Tensor, generator: torch.Generator) -> Tensor:
+        """Draw a start for each of N sources, (N,) int64, without exploration trajectories."""
+        return self._draw_from(source * self.trajectories, generator)
+
+    def _draw_from(self, which: Tensor, generator: torch.Generator) -> Tensor:
+        index = (torch.rand(len(which), generator=generator) * self.count[which]).long()
+        return self.states[self.first[which] + index]
 
 
 def build_start_sampler(tables: SceneBatch, visited: Tensor | None = None) -> StartSampler:

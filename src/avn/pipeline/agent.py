@@ -8,9 +8,12 @@ import torch
 from omegaconf import DictConfig
 
 from avn.agents.base import Agent
+from avn.agents.external import External, build_policy, policy_files
 from avn.core.classes import build_object
 from avn.core.errors import UserError
+from avn.core.hashing import file_hash
 from avn.mapping.base import Mapper
+from avn.mapping.ego_map import EgoMap
 from avn.modules.stop_threshold import check_decision
 from avn.navigation.protocols import Protocol
 from avn.pipeline import policy, policy_data, stop_classifier
@@ -45,7 +48,7 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
         learnt = policy_data.parts(cfg) if policy.learns(cfg) else {}
         if learnt and ready:
             learnt["network"] = policy.Policy(cfg).load()
-        return build_object("baseline", cfg.baseline, **learnt)
+        return build_object("baseline", cfg.baseline, map_size=cfg.mapper.size, **learnt)
     if not cfg.planner._target_:
         raise UserError(
             "baseline: 'none' cannot act, and there is no planner; choose random_walk, greedy, "
@@ -59,6 +62,25 @@ def build_agent(cfg: DictConfig, ready: bool = False) -> Agent:
     if ready and decides(cfg):
         given["stop_at"] = stop_classifier.StopNetwork(cfg).threshold()
     return build_object("planner", cfg.planner, **given)
+
+
+def is_external(cfg: DictConfig) -> bool:
+    """Return whether the config's agent is a policy of the user."""
+    target = cfg.baseline._target_
+    return bool(target) and target == f"{External.__module__}.{External.__qualname__}"
+
+
+def agent_content(cfg: DictConfig) -> list[Any]:
+    """Return what the fingerprint of a run has of the code and the files of the agent's policy.
+
+    The hashes of the files that its arguments name. `Stage.inputs` has the source of its module.
+    """
+    if not is_external(cfg):
+        return []
+    agent = build_agent(cfg)
+    assert isinstance(agent, External)
+    files = policy_files(agent.policy, agent.settings)
+    return [{name: file_hash(path) for name, path in files.items()}]
 
 
 def decides(cfg: DictConfig) -> bool:
@@ -80,7 +102,8 @@ def agent_stages(cfg: DictConfig) -> list[Stage]:
 def agent_settings(cfg: DictConfig) -> list[str]:
     """Return the keys of the config that change the agent's actions."""
     if not cfg.planner._target_:
-        return ["baseline"]
+        maps = is_external(cfg) and "map" in cfg.baseline.observations
+        return ["baseline", *(["mapper.size"] if maps else [])]
     decision: list[str] = []
     if decides(cfg):
         selected = cfg.stop_model.threshold is None
@@ -108,6 +131,10 @@ def check_agent(cfg: DictConfig, agent: Agent) -> None:
     """Refuse settings that would fail once the agent acts, such as the size of its map."""
     if cfg.planner._target_:
         agent.reset(1, torch.Generator(), build_object("protocol", cfg.protocol))
+    if isinstance(agent, External):
+        build_policy(agent.policy, agent.settings)
+        if "map" in agent.observations:
+            EgoMap(1, agent.map_size, agent.map_width)
     if decides(cfg):
         check_decision(cfg.stop_model.criterion, cfg.stop_model.threshold)
 

@@ -6,6 +6,7 @@ have the same split and the same acoustics.
 
 from __future__ import annotations
 
+import dataclasses
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,7 +18,8 @@ from omegaconf import DictConfig, OmegaConf
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid
-from avn.apartments.splits import PARTS, load_split
+from avn.apartments.settings import SplitConfig
+from avn.apartments.splits import DEFAULTS, PARTS, load_split
 from avn.core.errors import UserError
 from avn.core.files import check_name, partial_folder
 from avn.core.hashing import digest
@@ -104,9 +106,11 @@ class Apartments:
     @property
     def keys(self) -> tuple[str, ...]:
         """Keys of the split that the apartments depend on; a folder needs no generator."""
+        names: tuple[str, ...] = ("name", "folder")
         if self.node("split").folder is None:
-            return (self.world.split,)
-        return tuple(f"{self.world.split}.{key}" for key in ("name", "folder"))
+            every = (each.name for each in dataclasses.fields(SplitConfig))
+            names = tuple(name for name in every if name not in DEFAULTS)
+        return tuple(f"{self.world.split}.{name}" for name in names)
 
     @property
     def title(self) -> str:

@@ -57,6 +57,15 @@ class Clips:
     purpose: str = "eval"
 
 
+def check_realisations(cfg: DictConfig, clips: Clips) -> None:
+    """Raise `UserError` for a number of realisations that is out of range."""
+    count = OmegaConf.select(cfg, clips.realisations)
+    if not 1 <= count <= MOST_REALISATIONS:
+        raise UserError(
+            f"{clips.realisations}: {count} is out of range; give 1 to {MOST_REALISATIONS}"
+        )
+
+
 class AudioInference(ApartmentTensors):
     """Stage of a network's outputs for every clip of apartments.
 
@@ -122,11 +131,7 @@ class AudioInference(ApartmentTensors):
                 f"{self.apartments.world.acoustics}.rate: {rate}, and the {self.network.kind} is "
                 f"trained at {known} Hz; give training.acoustics.rate the same"
             )
-        if not 1 <= self.realisations <= MOST_REALISATIONS:
-            raise UserError(
-                f"{self.clips.realisations}: {self.realisations} is out of range; give 1 to "
-                f"{MOST_REALISATIONS}"
-            )
+        check_realisations(self.cfg, self.clips)
         dry_sounds(self.cfg, self.apartments.world)  # refuses recordings that cannot be read
 
     def opened(self) -> Callable[[int], Tensor]:

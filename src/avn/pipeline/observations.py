@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import torch
 from omegaconf import DictConfig
 from torch import Tensor
@@ -14,11 +15,12 @@ from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.dataset.scene import Scene
 from avn.dataset.source_locations import locate_sources
-from avn.navigation.observations import SceneObservations
+from avn.navigation.observations import RenderedAudio, SceneObservations
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.occupancy import LocalPatches, has_occupancy_model, true_local_patches
+from avn.pipeline.rendered_audio import Spectrograms, Waveforms
 from avn.pipeline.sound_network import SourceEstimates, has_sound_model
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stop_classifier import StopProbabilities, has_stop_model
@@ -42,7 +44,7 @@ class Observation:
     stage : callable
         Function of config, apartments and clips; returns the stage that computes it.
     load : callable
-        Function of that stage; returns a tensor for each apartment.
+        Function of that stage; returns a tensor for each apartment, or a `RenderedAudio`.
     there : callable
         Function of the config; returns whether it has the network that computes it.
     hint : str
@@ -55,18 +57,21 @@ class Observation:
         Keys of the config that change it in addition to those of its stage.
     true_settings : tuple of str
         Keys of the config that change its ground truth.
+    rendered : bool
+        Whether it is rendered when an agent hears it, and in no tensor.
     """
 
     shape: str
     audio: bool
     stage: Callable[[DictConfig, Apartments, Clips], Any]
-    load: Callable[[Any], list[Tensor]]
+    load: Callable[[Any], list[Any]]
     there: Callable[[DictConfig], bool] = lambda cfg: True
     hint: str = ""
     truth: str | None = None
     true: Callable[[Apartments, Sequence[Scene]], list[Tensor]] | None = None
     settings: tuple[str, ...] = ()
     true_settings: tuple[str, ...] = ()
+    rendered: bool = False
 
 
 def _true_estimates(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
@@ -110,19 +115,33 @@ OBSERVATIONS = {
         load=AudioEmbeddings.load,
         there=has_sound_model,
     ),
+    "waveform": Observation(
+        shape="(2, rate): one second of sound at the left and the right ear",
+        audio=True,
+        stage=Waveforms,
+        load=Waveforms.load,
+        rendered=True,
+    ),
+    "spectrogram": Observation(
+        shape="(channels, bands, frames): spectrogram of that second; see `Spectrogram`",
+        audio=True,
+        stage=Spectrograms,
+        load=Spectrograms.load,
+        rendered=True,
+    ),
     "view": Observation(
         shape="(3, H, W): uint8 picture",
         audio=False,
         stage=lambda cfg, apartments, clips: RenderedViews(cfg, apartments),
         load=lambda stage: [
-            torch.from_numpy(views.rgb[:]).permute(0, 3, 1, 2) for views in stage.load()
+            torch.from_numpy(np.array(views.rgb)).permute(0, 3, 1, 2) for views in stage.load()
         ],
     ),
     "depth": Observation(
         shape="(H, W): metres",
         audio=False,
         stage=lambda cfg, apartments, clips: RenderedViews(cfg, apartments),
-        load=lambda stage: [torch.from_numpy(views.depth[:]) for views in stage.load()],
+        load=lambda stage: [torch.from_numpy(np.array(views.depth)) for views in stage.load()],
     ),
     "visual_embedding": Observation(
         shape="(D,): last layer of the backbone, of length 1",
@@ -238,7 +257,7 @@ class Observed:
         list of SceneObservations
             Observations in each scene.
         """
-        observed: list[tuple[dict[str, Tensor], dict[str, Tensor]]] = [({}, {}) for _ in scenes]
+        observed: list[tuple[dict[str, Any], ...]] = [({}, {}, {}) for _ in scenes]
         stages = self.stages
         for name in self.names:
             observation = OBSERVATIONS[name]
@@ -246,14 +265,19 @@ class Observed:
                 tensors = observation.true(self.apartments, scenes)
             else:
                 tensors = observation.load(stages[name])
-            for (audio, visual), tensor in zip(observed, tensors, strict=True):
-                (audio if observation.audio else visual)[name] = tensor
-        return [SceneObservations(_alike(audio), visual) for audio, visual in observed]
+            kind = 2 if observation.rendered else 0 if observation.audio else 1
+            for own, tensor in zip(observed, tensors, strict=True):
+                own[kind][name] = tensor
+        return [
+            SceneObservations(_alike(audio, rendered), visual, rendered)
+            for audio, visual, rendered in observed
+        ]
 
 
-def _alike(audio: dict[str, Tensor]) -> dict[str, Tensor]:
+def _alike(audio: dict[str, Tensor], rendered: dict[str, RenderedAudio]) -> dict[str, Tensor]:
     """Return audio observations with equal numbers of realisations; ground truth has only one."""
-    most = max((tensor.shape[3] for tensor in audio.values()), default=1)
+    counts = [tensor.shape[3] for tensor in audio.values()]
+    most = max([*counts, *(each.realisations for each in rendered.values())], default=1)
     return {
         name: tensor.expand(*tensor.shape[:3], most, *tensor.shape[4:])
         for name, tensor in audio.items()

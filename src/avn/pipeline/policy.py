@@ -30,6 +30,7 @@ from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.policy_data import (
     SUBSETS,
     actor_critic,
+    check_observations,
     feature_sizes,
     load_subset,
     observation_names,
@@ -96,6 +97,7 @@ class Policy(Trained):
             )
         check_name("agent.name", self.cfg.agent.name)
         build_algorithm(self.cfg)
+        check_observations(self.cfg)
         if self.cfg.baseline.memory and not self.cfg.protocol.exploration_steps:
             raise UserError(
                 "protocol.exploration_steps: 0, and an agent with memory explores; give 400"
@@ -196,7 +198,7 @@ def _network_spec(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
 def _train(policy: Policy) -> None:
     """Train a policy and write its metrics."""
     from avn.rl.networks import ActorCritic
-    from avn.rl.training import MONITOR, Training
+    from avn.rl.training import MONITOR, Training, best_of
     from avn.rl.worker import TrainingSpec
 
     started = time.perf_counter()
@@ -226,11 +228,13 @@ def _train(policy: Policy) -> None:
     curve = Training(
         spec, network, policy.folder, measure, policy.fingerprint, policy.run_name
     ).run()
-    best = max(curve, key=lambda point: point[MONITOR])
-    if best is curve[0]:
+    best = best_of(curve)
+    if best[MONITOR] <= curve[0][MONITOR]:
         log(
-            f"{policy.folder}: no network was better on validation than the untrained one, which "
-            "is kept; give more algorithm.total_steps, or a smaller algorithm.validate_every"
+            f"warning: {policy.folder}: no network was better on validation than the untrained one "
+            f"({MONITOR} {curve[0][MONITOR]:.3f}); the one after {best['steps']:.0f} steps is kept "
+            f"({best[MONITOR]:.3f}); give more algorithm.total_steps, more "
+            "algorithm.validation_starts, or a split with more validation apartments"
         )
     metrics: dict[str, Any] = {f"best/{name}": value for name, value in best.items()}
     metrics |= {f"untrained/{name}": value for name, value in curve[0].items()}

@@ -8,12 +8,13 @@ from omegaconf import DictConfig
 
 from avn.agents.actor_critic import ActorCriticAgent
 from avn.core.classes import build_object
+from avn.core.errors import UserError
 from avn.dataset.scene import Scene
 from avn.navigation.observations import SceneObservations
 from avn.navigation.scene_batch import SceneBatch, build_scene_batch
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.audio_inference import Clips
-from avn.pipeline.observations import Observed
+from avn.pipeline.observations import OBSERVATIONS, Observed
 from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.scenes import Geometry
 from avn.pipeline.sound_network import has_sound_model
@@ -31,13 +32,14 @@ def parts(cfg: DictConfig) -> dict[str, Any]:
     return {
         "hears": has_sound_model(cfg),
         "maps": has_occupancy_model(cfg),
-        "map_size": cfg.mapper.size,
     }
 
 
 def actor_critic(cfg: DictConfig, network: ActorCritic | None = None) -> ActorCriticAgent:
     """Build the actor-critic agent of a config, with a network if it shall act."""
-    agent: ActorCriticAgent = build_object("baseline", cfg.baseline, network=network, **parts(cfg))
+    agent: ActorCriticAgent = build_object(
+        "baseline", cfg.baseline, network=network, map_size=cfg.mapper.size, **parts(cfg)
+    )
     return agent
 
 
@@ -62,6 +64,19 @@ def observed(cfg: DictConfig, subset: str) -> Observed:
     names = observation_names(cfg)
     clips = Clips("algorithm.realisations", "train") if subset == "train" else Clips()
     return Observed(Apartments(cfg, subset, TRAINING), names, clips)
+
+
+def check_observations(cfg: DictConfig) -> None:
+    """Refuse observations of an actor-critic that do not exist, or that no table can hold."""
+    names, agent = observation_names(cfg), str(cfg.baseline._target_).rpartition(".")[2]
+    observed(cfg, "train").check(agent, names)
+    for name in names:
+        if name in OBSERVATIONS and OBSERVATIONS[name].rendered:
+            tables = [own for own, each in OBSERVATIONS.items() if not each.rendered]
+            raise UserError(
+                f"agent {agent} needs the observation '{name}', which is rendered at each step, "
+                f"and avn.train learns from {', '.join(tables)}; train in avn.make_env instead"
+            )
 
 
 def subset_stages(cfg: DictConfig, subset: str) -> list[Stage]:

@@ -23,6 +23,7 @@ from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.pipeline import perception_tables
 from avn.pipeline.agent import (
+    agent_content,
     agent_ignored,
     agent_settings,
     agent_stages,
@@ -34,7 +35,6 @@ from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import learns
 from avn.pipeline.recordings import keep_recordings
-from avn.pipeline.run_events import write_events
 from avn.pipeline.scenes import Geometry
 from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
 from avn.pipeline.stage import Stage
@@ -114,8 +114,8 @@ class Evaluation(Stage):
         return ("subset", "sound", "film", "film_show", "film_speed")
 
     def content(self) -> Any:
-        """Return the hashes of the recordings."""
-        return sounds_content(self.cfg)
+        """Return the hashes of the recordings, and of the policy of an external agent."""
+        return [*sounds_content(self.cfg), *agent_content(self.cfg)]
 
     @property
     def title(self) -> str:
@@ -175,6 +175,8 @@ class Evaluation(Stage):
 
     def make(self) -> None:
         """Run the episodes and write `episodes.csv`, `results.csv` and TensorBoard events."""
+        from avn.pipeline.run_events import write_events
+
         cfg, folder, scenes = self.cfg, self.folder, self.geometry.load()
         observations = self.observed.load(scenes)
         episodes = pd.concat(rollout_scenes(cfg, scenes, observations), ignore_index=True)

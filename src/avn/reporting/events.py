@@ -10,9 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from torch.utils.tensorboard import SummaryWriter
-from torch.utils.tensorboard.summary import hparams
-
 # Columns of settings, the most telling first, each with its type in the table.
 SETTINGS: dict[str, type] = {
     "agent": str,
@@ -59,6 +56,9 @@ def write_summary(
     suffix : str
         Suffix of the file; an older file with it is replaced.
     """
+    from torch.utils.tensorboard import SummaryWriter
+    from torch.utils.tensorboard.summary import hparams
+
     if unknown := (set(settings) - set(SETTINGS)) | (set(metrics) - set(METRICS)):
         raise ValueError(f"not in the table of all runs: {', '.join(sorted(unknown))}")
     if suffix:

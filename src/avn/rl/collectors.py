@@ -19,9 +19,9 @@ _NUMBERS = ("state", "clip")
 class Batches(Protocol):
     """Protocol of collectors of batches of N episodes and T steps.
 
-    A batch is a TensorDict (N, T) in the layout of TorchRL: `index`, `is_init`, `action`, and
-    `map`, `h` and `c` if the policy uses them; `next` holds the same after the action, and
-    `reward`, `terminated`, `truncated` and `done`.
+    A batch is a TensorDict (N, T) in the layout of TorchRL: `index`, `is_init`, `success`,
+    `action`, and `map`, `h` and `c` if the policy uses them; `next` holds the same after the
+    action, and `reward`, `terminated`, `truncated` and `done`.
     """
 
     def collect(self) -> TensorDict:
@@ -120,7 +120,7 @@ def _laid_out(steps: list[dict[str, Tensor]]) -> TensorDict:
 
 
 # TorchRL keeps a last axis of 1 for these.
-_FLAGS = ("is_init", "reward", "terminated", "truncated", "done")
+_FLAGS = ("is_init", "success", "reward", "terminated", "truncated", "done")
 COLLECTORS: dict[str, Callable[[NavigationEnv, Policy, int], Batches]] = {
     "torchrl": TorchrlCollector,
     "tensor": TensorCollector,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,8 +15,10 @@ from torchrl.envs import EnvBase
 from avn.core.errors import UserError
 from avn.mapping.ego_map import EgoMap
 from avn.navigation.batched_episodes import BatchedEpisodes
+from avn.navigation.episode_metrics import episode_metrics
 from avn.rl.exploration_memory import ExplorationMemory
 from avn.rl.features import FeatureModule
+from avn.rl.observation_specs import spec_of, to_spec
 
 # Observations that are no features of clips or views.
 OWN = ("collided", "odometry", "map")
@@ -28,10 +31,10 @@ class NavigationEnv(EnvBase):
     ----------
     episodes : BatchedEpisodes
         States, rewards and ends of the episodes.
-    observes : sequence of str
-        Names of the observations: visual ones (`visual_embedding`, `local_patch`, ...) and audio
-        ones (`source_estimate`, `audio_embedding`, ...) of `episodes.tables`, and `collided`,
-        `odometry` and `map`.
+    observations : sequence of str
+        Names of the observations: visual ones (`visual_embedding`, `view`, ...) and audio ones
+        (`audio_embedding`, `waveform`, ...) of `episodes.tables`, and `collided`, `odometry` and
+        `map`.
     explorations : ExplorationMemory, optional
         Exploration trajectories, whose LSTM states are the first `h` and `c` of episodes.
     memory : int
@@ -40,7 +43,8 @@ class NavigationEnv(EnvBase):
     map_size, map_width : int
         Squares along each side of the occupancy map, and of its observed part, for `map`.
     resolved : bool
-        True if observations hold features; False if they hold the numbers `state` and `clip` under
+        True if observations hold features, in the ranges of `avn.rl.observation_specs`, and under
+        `info` the metrics of the episodes; False if they hold the numbers `state` and `clip` under
         `index`, for `features`.
 
     Raises
@@ -54,7 +58,7 @@ class NavigationEnv(EnvBase):
     def __init__(
         self,
         episodes: BatchedEpisodes,
-        observes: Sequence[str],
+        observations: Sequence[str],
         explorations: ExplorationMemory | None = None,
         memory: int = 0,
         map_size: int = 101,
@@ -63,17 +67,18 @@ class NavigationEnv(EnvBase):
     ) -> None:
         super().__init__(device="cpu", batch_size=[episodes.n])
         tables = episodes.tables
-        known = (*tables.visual, *tables.audio, *OWN)
-        for name in observes:
+        known = (*tables.visual, *tables.audio, *tables.rendered, *OWN)
+        for name in observations:
             if name not in known:
-                raise UserError(f"observes: '{name}' is none of {', '.join(known)}")
-        self.episodes, self.observes = episodes, tuple(observes)
-        self.features = FeatureModule(tables, observes)
+                raise UserError(f"observations: '{name}' is none of {', '.join(known)}")
+        self.episodes, self.observations = episodes, tuple(observations)
+        self.features = FeatureModule(tables, observations)
         self.explorations, self.resolved = explorations, resolved
         self.memory_units, self.map_width = memory, map_width
-        self._map = EgoMap(episodes.n, map_size, map_width) if "map" in observes else None
+        self._map = EgoMap(episodes.n, map_size, map_width) if "map" in observations else None
         self._kept = False
         self._everyone = torch.ones(episodes.n, dtype=torch.bool)
+        self.collisions = torch.zeros(episodes.n, dtype=torch.int64)
         self.begin(self._everyone)
         self._make_specs()
 
@@ -83,6 +88,11 @@ class NavigationEnv(EnvBase):
         """Begin new episodes in some rows, (N,) bool."""
         self.episodes.begin(rows)
         self.is_init = rows.clone()
+        self.collisions = self.collisions.masked_fill(rows, 0)
+        self.forget(rows)
+
+    def forget(self, rows: Tensor) -> None:
+        """Clear LSTM states and maps of episodes that have just begun in some rows, (N,) bool."""
         if self.memory_units:
             h, c = self._first_memory()
             if bool(rows.all()):
@@ -112,6 +122,7 @@ class NavigationEnv(EnvBase):
             See `BatchedEpisodes.step`.
         """
         outcome = self.episodes.step(actions)
+        self.collisions = self.collisions + self.episodes.collided
         self.is_init = torch.zeros_like(self._everyone)
         if h is not None and c is not None:
             self.h, self.c = h, c
@@ -120,15 +131,16 @@ class NavigationEnv(EnvBase):
         return outcome
 
     def observation(self) -> dict[str, Tensor]:
-        """Return state and clip numbers, `is_init`, own observations and LSTM state by name."""
+        """Return state and clip numbers, `is_init`, `success`, own observations, LSTM state."""
         found = {
             "state": self.episodes.state,
             "clip": self.episodes.clip(),
             "is_init": self.is_init,
+            "success": self.episodes.success,
         }
-        if "collided" in self.observes:
+        if "collided" in self.observations:
             found["collided"] = self.episodes.collided
-        if "odometry" in self.observes:
+        if "odometry" in self.observations:
             found["odometry"] = self.episodes.odometry()
         if self._map is not None:
             found["map"] = self._around
@@ -136,11 +148,19 @@ class NavigationEnv(EnvBase):
             found |= {"h": self.h, "c": self.c}
         return found
 
+    def shown(self) -> dict[str, Tensor]:
+        """Return the observations by name, each (N, ...) in its range; see `to_spec`."""
+        found = self.observation()
+        found |= self.features(found["state"], found["clip"])
+        found |= self.episodes.tables.render(self.episodes.clip_id())
+        return {name: to_spec(name, found[name]) for name in self.observations}
+
     def state_dict(self, *args: Any, **kwargs: Any) -> dict[str, Any]:
         """Return copies of all tensors that change."""
         kept: dict[str, Any] = {
             "episodes": self.episodes.state_dict(),
             "is_init": self.is_init.clone(),
+            "collisions": self.collisions.clone(),
         }
         if self.memory_units:
             kept |= {"h": self.h.clone(), "c": self.c.clone()}
@@ -152,6 +172,7 @@ class NavigationEnv(EnvBase):
         """Restore what `state_dict` returned; the next `reset_all` then begins no episode."""
         self.episodes.load_state_dict(kept["episodes"])
         self.is_init = kept["is_init"].clone()
+        self.collisions = kept.get("collisions", self.collisions).clone()
         if self.memory_units:
             self.h, self.c = kept["h"].clone(), kept["c"].clone()
         if self._map is not None:
@@ -199,10 +220,15 @@ class NavigationEnv(EnvBase):
         found = self.observation()
         numbers = {"state": found.pop("state"), "clip": found.pop("clip")}
         if self.resolved:
-            found |= self.features(**numbers)
+            found |= self.shown()
+            metrics = episode_metrics(self.episodes, self.collisions)
+            own = {name: value[:, None].float() for name, value in metrics.items()}
+            own["success"] = metrics["success"][:, None]
+            found["info"] = TensorDict(own, batch_size=self.batch_size)
         else:
             found["index"] = TensorDict(numbers, batch_size=self.batch_size)
-        found["is_init"] = found["is_init"][:, None]
+        for name in ("is_init", "success"):
+            found[name] = found[name][:, None]
         return TensorDict(found, batch_size=self.batch_size)
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: Any) -> TensorDict:
@@ -224,7 +250,7 @@ class NavigationEnv(EnvBase):
         return following
 
     def _set_seed(self, seed: int | None) -> None:
-        self.episodes.generator.manual_seed(0 if seed is None else seed)
+        self.episodes.seed(secrets.randbits(62) if seed is None else seed)
 
     def _make_specs(self) -> None:
         n, episodes = self.episodes.n, self.episodes
@@ -250,12 +276,15 @@ class NavigationEnv(EnvBase):
                 {key: _whole(0, most[key] - 1, value[key].shape) for key in most},
                 shape=self.batch_size,
             )
+        if isinstance(value, TensorDictBase):
+            return Composite(
+                {key: self._spec(key, own) for key, own in value.items()}, shape=self.batch_size
+            )
         if value.dtype == torch.bool:
             return Categorical(2, shape=value.shape, dtype=torch.bool)
-        if name == "map":
-            return Bounded(0.0, 1.0, shape=value.shape)
-        if name in (*self.features.visual, *self.features.audio):
-            return Bounded(*self.features.range(name), shape=value.shape, dtype=value.dtype)
+        if name in self.observations:
+            own = spec_of(name)
+            return Bounded(own.low, own.high, shape=value.shape, dtype=value.dtype)
         return Unbounded(shape=value.shape, dtype=value.dtype)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import torch
 from torch import Tensor, nn
 
 from avn.navigation.scene_batch import SceneBatch
@@ -19,7 +18,7 @@ class FeatureModule(nn.Module):
     ----------
     tables : SceneBatch
         Holds the features.
-    observes : sequence of str
+    names : sequence of str
         Names in `tables.visual` and `tables.audio`; other names are ignored.
 
     Attributes
@@ -28,18 +27,13 @@ class FeatureModule(nn.Module):
         Names of the features of states and of clips.
     """
 
-    def __init__(self, tables: SceneBatch, observes: Sequence[str]) -> None:
+    def __init__(self, tables: SceneBatch, names: Sequence[str]) -> None:
         super().__init__()
-        self.visual = [name for name in observes if name in tables.visual]
-        self.audio = [name for name in observes if name in tables.audio]
+        self.visual = [name for name in names if name in tables.visual]
+        self.audio = [name for name in names if name in tables.audio]
         for name in (*self.visual, *self.audio):
             table = tables.visual.get(name, tables.audio.get(name))
             self.register_buffer(name, table, persistent=False)
-
-    def range(self, name: str) -> tuple[float, float]:
-        """Return the smallest and the largest value of a feature, with NaN as 0."""
-        low, high = torch.aminmax(torch.nan_to_num(getattr(self, name).float()))
-        return float(low), float(high)
 
     def forward(self, state: Tensor, clip: Tensor) -> dict[str, Tensor]:
         """Look up features by name.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -162,9 +162,8 @@ class Training:
         """Validate, save the best network, log, and write the checkpoint."""
         self._weights.copy_(self.shared.weights)
         found = {"steps": float(self.steps), **metrics, **self.measure(self.network)}
-        best = max((own[MONITOR] for own in self.curve), default=float("-inf"))
         self.curve.append(found)
-        if found[MONITOR] > best:
+        if best_of(self.curve) is found:
             self._write(BEST, save_network(self.network, self.fingerprint))
         for name, value in found.items():
             if name != "steps":
@@ -202,6 +201,16 @@ class Training:
         except (KeyError, RuntimeError) as error:
             raise _damaged(path) from error
         log(f"{path}: going on after {self.steps} steps")
+
+
+def best_of(curve: Sequence[dict[str, float]]) -> dict[str, float]:
+    """Return the entry of a curve whose network is kept.
+
+    It is the best on validation of the networks that were trained, the latest of equal ones. The
+    untrained network, the first entry, is the best only while it is alone: small validation
+    apartments may rate it higher by chance.
+    """
+    return max(reversed(curve[1:] or curve), key=lambda point: point[MONITOR])
 
 
 def save_network(network: ActorCritic, fingerprint: str) -> dict[str, Any]:

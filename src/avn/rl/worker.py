@@ -223,13 +223,14 @@ class EpisodeStats:
         self._successes: list[float] = []
 
     def update(self, batch: Any) -> None:
-        """Add the rewards and ends of a batch (N, T)."""
+        """Add the rewards, ends and successes of a batch (N, T)."""
         rewards, done = batch["next", "reward"][..., 0], batch["next", "done"][..., 0]
+        success = batch["next", "success"][..., 0].float()
         for step in range(rewards.shape[1]):
             self._running = self._running + rewards[:, step]
             ended = done[:, step]
             self.returns += self._running[ended].tolist()
-            self._successes += (rewards[:, step][ended] > 0).float().tolist()
+            self._successes += success[:, step][ended].tolist()
             self._running = self._running.masked_fill(ended, 0.0)
 
     def metrics(self) -> dict[str, float]:

@@ -1,0 +1,196 @@
+"""Clips as agents hear them: waveforms and spectrograms that are rendered step by step.
+
+A tensor of the waveforms of all clips would have gigabytes, so a clip is rendered when an agent
+hears it. It is the clip that the networks hear: same microphone, seed and realisation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+from omegaconf import DictConfig, OmegaConf
+from torch import Tensor
+
+from avn.acoustics.clips import ClipRenderer, brir_spectra
+from avn.core.classes import build_object, build_part
+from avn.core.clip_id import ClipId
+from avn.core.settings import plain
+from avn.dataset.scene import AudibleScene
+from avn.modules.spectrogram import Spectrogram
+from avn.pipeline.apartments import Apartments
+from avn.pipeline.audio_inference import HEARING_SEED, Clips, check_realisations
+from avn.pipeline.scenes import DirectSound
+from avn.pipeline.sounds import dry_sounds, sounds_content
+from avn.pipeline.stage import Stage
+
+# Clips rendered at once, for the caches of a CPU.
+_BATCH = 64
+
+
+class Waveforms(Stage):
+    """Stage of the waveforms of clips. It has no file of its own: it reads those of its need.
+
+    Parameters
+    ----------
+    cfg : DictConfig
+        Config of a command.
+    apartments : Apartments
+        Apartments; sounds and microphone are those of their world.
+    clips : Clips
+        Clip realisations.
+    """
+
+    kind = "hear/waveforms"
+
+    def __init__(self, cfg: DictConfig, apartments: Apartments, clips: Clips) -> None:
+        super().__init__(cfg)
+        self.apartments, self.clips = apartments, clips
+
+    def needs(self) -> Sequence[Stage]:
+        """Return the stage of the apartments' acoustics."""
+        return (DirectSound(self.cfg, self.apartments),)
+
+    def settings(self) -> Sequence[str]:
+        """Return the keys of the microphone and of the number of realisations."""
+        return (self.apartments.world.microphone, self.clips.realisations)
+
+    def consulted(self) -> Sequence[str]:
+        """Return the key of the sounds; the fingerprint holds their content instead."""
+        return (self.apartments.world.sounds,)
+
+    def content(self) -> Any:
+        """Return the hashes of the recordings, and the seeds of the realisations."""
+        return (sounds_content(self.cfg, self.apartments.world), self.clips.purpose, HEARING_SEED)
+
+    @property
+    def title(self) -> str:
+        """Title of the product, for messages."""
+        return f"clips of {self.apartments.title} ({self.clips.purpose})"
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the acoustics, which are all it reads."""
+        return self.needed[0].folder
+
+    def check(self) -> None:
+        """Refuse a number of realisations that is out of range."""
+        check_realisations(self.cfg, self.clips)
+
+    def done(self) -> bool:
+        """Return whether the acoustics exist."""
+        return all(need.done() for need in self.needed)
+
+    def make(self) -> None:
+        """Make nothing; the acoustics are made before."""
+
+    def output(self) -> tuple[Callable[[Tensor], Tensor], tuple[int, ...]]:
+        """Return the function from clips (N, 2, rate) to observations, and the shape of one."""
+        return (lambda clips: clips), (2, self._rate)
+
+    @property
+    def _rate(self) -> int:
+        return int(self.apartments.node("acoustics").rate)
+
+    def load(self) -> list[RenderedClips]:
+        """Return the renderer of each apartment."""
+        world = self.apartments.world
+        microphone = build_object(world.microphone, OmegaConf.select(self.cfg, world.microphone))
+        sounds = dry_sounds(self.cfg, world)
+        renderer = ClipRenderer(sounds, microphone, HEARING_SEED, self.clips.purpose)
+        realisations = int(OmegaConf.select(self.cfg, self.clips.realisations))
+        output, shape = self.output()
+        return [
+            RenderedClips(scene, renderer, realisations, output, shape)
+            for scene in self.needs()[0].load()
+        ]
+
+
+class Spectrograms(Waveforms):
+    """Stage of the spectrograms of clips, those of the sound network if there is one."""
+
+    kind = "hear/spectrograms"
+
+    def settings(self) -> Sequence[str]:
+        """Return the keys of the clips and of the spectrogram."""
+        return (*super().settings(), *(("sound_model.spectrogram",) if self._config else ()))
+
+    @property
+    def _config(self) -> Any:
+        return self.cfg.sound_model.get("spectrogram")
+
+    def check(self) -> None:
+        """Refuse an invalid spectrogram."""
+        super().check()
+        self.output()
+
+    def output(self) -> tuple[Callable[[Tensor], Tensor], tuple[int, ...]]:
+        """Return the spectrogram, and the shape (channels, bands, frames)."""
+        found: Spectrogram
+        if self._config:
+            settings = plain(self.cfg, "sound_model.spectrogram")
+            found = build_part(settings, "sound_model", rate=self._rate)
+        else:
+            found = Spectrogram(rate=self._rate)
+        return found, (found.channels, found.bands, found.frames)
+
+
+class RenderedClips:
+    """Renderer of the clips of one apartment; see `avn.navigation.observations.RenderedAudio`.
+
+    Parameters
+    ----------
+    scene : AudibleScene
+        Apartment with its impulse responses.
+    renderer : ClipRenderer
+        Sounds and microphone.
+    realisations : int
+        Number of realisations of each clip.
+    output : callable
+        Function from clips (N, 2, rate) to observations (N, ...).
+    shape : tuple of int
+        Shape of one observation.
+    """
+
+    def __init__(
+        self,
+        scene: AudibleScene,
+        renderer: ClipRenderer,
+        realisations: int,
+        output: Callable[[Tensor], Tensor],
+        shape: tuple[int, ...],
+    ) -> None:
+        self._brirs, self._renderer, self._output = scene.brirs, renderer, output
+        self._realisations, self._shape = realisations, shape
+
+    @property
+    def sounds(self) -> int:
+        """Number of sounds."""
+        return len(self._renderer.sounds)
+
+    @property
+    def realisations(self) -> int:
+        """Number of realisations of each clip."""
+        return self._realisations
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the observation of one clip."""
+        return self._shape
+
+    @torch.no_grad()
+    def __call__(self, clip: ClipId) -> Tensor:
+        """Render N clips, (N, ...) float32."""
+        return torch.cat(
+            [
+                self._rendered(ClipId(*parts))
+                for parts in zip(*(part.split(_BATCH) for part in clip), strict=True)
+            ]
+        )
+
+    def _rendered(self, clip: ClipId) -> Tensor:
+        brirs = self._brirs.gather(clip.source, clip.state)
+        spectra = brir_spectra(brirs, self._renderer.sounds.rate)
+        return self._output(self._renderer.render(spectra, clip))
