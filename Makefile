@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: reproduce test check benchmarks docs clean
+.PHONY: reproduce test check lowest benchmarks docs clean
 
 reproduce: $(VENV)/installed
 	$(BIN)/python -m avn.reproduce
@@ -16,6 +16,9 @@ check: $(VENV)/installed
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+lowest: $(VENV)/installed
+	$(BIN)/python scripts/lowest_versions.py $(VENV)-lowest
 
 benchmarks: $(VENV)/installed
 	for benchmark in benchmarks/*.py; do $(BIN)/python $$benchmark || exit 1; done
@@ -33,4 +36,4 @@ $(VENV)/installed: pyproject.toml
 	touch $@
 
 clean:
-	rm -rf $(VENV) site
+	rm -rf $(VENV) $(VENV)-lowest site

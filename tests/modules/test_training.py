@@ -1,3 +1,5 @@
+import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ from avn.acoustics.microphone import Microphone
 from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.settings import typed
+from avn.core.signals import exit_code_of
 from avn.datamodules.sound import SoundData
 from avn.modules.sound_cnn import SoundCnn
 from avn.modules.training import BEST, LAST, fit, load_weights
@@ -119,6 +122,53 @@ def test_resumed_training_is_the_uninterrupted_one(
     for name in (BEST, LAST):
         first, second = weights(folder / name), weights(tmp_path / name)
         assert all(torch.equal(first[key], second[key]) for key in first)
+
+
+class _SignalIn(_StopIn):
+    """Sends a signal to the process in the middle of an epoch."""
+
+    def __init__(self, epoch: int, number: signal.Signals) -> None:
+        super().__init__(epoch)
+        self.number = number
+
+    def on_train_batch_start(self, *args: Any) -> None:
+        try:
+            super().on_train_batch_start(*args)
+        except _InterruptedError:
+            os.kill(os.getpid(), self.number)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_training_that_a_signal_stops_goes_on_later(
+    run: tuple[Path, dict[str, Any]], tmp_path: Path, number: signal.Signals
+) -> None:
+    folder, metrics = run
+    data, model = build()
+    model.configure_callbacks = lambda: [_SignalIn(3, number)]
+    assert exit_code_of("avn.train", lambda: bool(fit(data, model, tmp_path))) == 128 + number
+    assert torch.load(tmp_path / LAST, weights_only=True)["epoch"] == 2
+    assert fit(*build(), tmp_path) == metrics
+    first, second = weights(folder / BEST), weights(tmp_path / BEST)
+    assert all(torch.equal(first[key], second[key]) for key in first)
+
+
+def test_ctrl_c_outside_of_a_command_is_a_keyboard_interrupt(tmp_path: Path) -> None:
+    data, model = build(epochs=1)
+    model.configure_callbacks = lambda: [_SignalIn(0, signal.SIGINT)]
+    handler = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            fit(data, model, tmp_path)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def test_a_batch_system_s_tasks_are_not_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in (("SLURM_NTASKS", "4"), ("SLURM_JOB_NAME", "job"), ("SLURM_PROCID", "0")):
+        monkeypatch.setenv(name, value)
+    assert fit(*build(epochs=1), tmp_path)["epochs"] == 1
 
 
 def test_finished_training_is_not_repeated(run: tuple[Path, dict[str, Any]]) -> None:

@@ -179,6 +179,33 @@ def test_a_worker_that_dies_ends_the_run_and_leaves_the_last_checkpoint_whole(
     assert training(spec, tmp_path).steps == 300
 
 
+def test_workers_share_files_and_no_shared_memory(flat, rules, tmp_path, monkeypatch):
+    """A container has 64 MB of shared memory, and the tables of a training may have more."""
+
+    def refuse(*_):
+        raise RuntimeError("unable to write to shared memory")
+
+    for name in ("_share_fd_cpu_", "_share_filename_cpu_"):
+        monkeypatch.setattr(torch.UntypedStorage, name, refuse)
+    spec = make_spec(random_tables([flat], rules), rules, workers=2, total_steps=120)
+    run = training(spec, tmp_path)
+    before = run.shared.weights.clone()
+    run.run()
+    assert int(run.shared.updates) == 4  # 120 steps of 6 environments and rollouts of 5
+    assert not torch.equal(run.shared.weights, before)
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_a_machine_without_semaphores_is_one_line(flat, rules, tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(worker_pool, "_locks", refuse)
+    spec = make_spec(random_tables([flat], rules), rules, workers=2, total_steps=120)
+    with pytest.raises(UserError, match=r"give algorithm\.workers=1"):
+        training(spec, tmp_path).run()
+
+
 def test_what_a_worker_refuses_is_said_in_one_line(flat, rules, tmp_path):
     spec = make_spec(random_tables([flat], rules), rules, workers=2, total_steps=600, maps=1)
     object.__setattr__(spec, "map_size", 5)  # a map that no agent fits on

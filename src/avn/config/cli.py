@@ -95,8 +95,8 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
         return task(cfg)
 
     job.__module__ = name
-    sweeps.begin()  # of one job or of many: an experiment may be a sweep by itself
     try:
+        sweeps.begin()  # of one job or of many: an experiment may be a sweep by itself
         sys.argv = [sys.argv[0], *arrange(option_files.take_folders(sys.argv[1:]))]
         _compose_and_do(config_name, job)
         if errors:
@@ -240,7 +240,9 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
             return f"{link.override}: cannot be read; put quotes round what Hydra reads as grammar"
     for link in chain:
         if isinstance(link, OSError) and link.filename and not isinstance(link, HydraException):
-            return _one_line(f"{link.filename}: {link.strerror}")
+            # what is not there was to be made
+            made = None if os.path.lexists(link.filename) else write_failure(link, "")
+            return _one_line(made or f"{link.filename}: {link.strerror}")
     if line := write_failure(error, "outputs"):
         return _one_line(line)
     if not composed or isinstance(error, USER_MISTAKES):

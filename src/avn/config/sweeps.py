@@ -18,14 +18,26 @@ from typing import Any
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
+from avn.core.errors import UserError
 from avn.reporting.world import trial_note
 
 _RECORDS = "AVN_SWEEP_RECORDS"
 
 
 def begin() -> None:
-    """Create the folder of a sweep's records; processes of jobs inherit its path."""
-    os.environ[_RECORDS] = tempfile.mkdtemp(prefix="avn-sweep-")
+    """Create the folder of a sweep's records; processes of jobs inherit its path.
+
+    Raises
+    ------
+    UserError
+        Where there is no temporary folder.
+    """
+    try:
+        os.environ[_RECORDS] = tempfile.mkdtemp(prefix="avn-sweep-")
+    except OSError as error:
+        raise UserError(
+            f"TMPDIR: no temporary folder can be written to ({error.strerror}); set it to one"
+        ) from error
 
 
 def run_job(

@@ -30,8 +30,8 @@ def choose_cache_folders() -> None:
         else:
             _compile_without_cache()
     home = _home()
-    config = Path(os.environ.get("XDG_CONFIG_HOME") or (home or Path("/")) / ".config")
-    if "MPLCONFIGDIR" not in os.environ and not _writable(config / "matplotlib"):
+    config = os.environ.get("XDG_CONFIG_HOME") or (home and home / ".config")
+    if not (config and _writable(Path(config) / "matplotlib")):
         _set("MPLCONFIGDIR", _folder("matplotlib"))
     if home is None:
         _set("TORCHINDUCTOR_CACHE_DIR", _folder("torchinductor"))

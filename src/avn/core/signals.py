@@ -44,9 +44,13 @@ def exit_code_of(name: str, task: Callable[[], int]) -> int:
     """
     with _handled() as received:
         try:
-            code = task()
-            with suppress(OSError, ValueError):  # so that the exit of Python has nothing to write
-                sys.stdout.flush()
+            try:
+                code = task()
+                with suppress(OSError, ValueError):  # so that the exit of Python writes nothing
+                    sys.stdout.flush()
+            finally:
+                # the handler of SIGPIPE runs after the error of the write, at the next call
+                _nothing()
         except BaseException:
             if not received:
                 raise
@@ -58,6 +62,10 @@ def exit_code_of(name: str, task: Callable[[], int]) -> int:
             with suppress(OSError):  # of a terminal that is closed
                 print(_line(name, received[0]), file=sys.stderr, flush=True)
         return 128 + received[0]
+
+
+def _nothing() -> None:
+    """Give the handlers of signals that have come an occasion to run."""
 
 
 def _line(name: str, number: int) -> str:
@@ -82,7 +90,12 @@ def _handled() -> Iterator[list[int]]:
         received.append(number)
         raise Stopped
 
-    before = {}
+    def report(error: threading.ExceptHookArgs) -> None:
+        if not isinstance(error.exc_value, OSError):  # which TensorBoard raises at its end too
+            threading.__excepthook__(error)
+
+    before, hook = {}, threading.excepthook
+    threading.excepthook = report
     if threading.current_thread() is threading.main_thread():
         for number in (*STOPPING, signal.SIGPIPE):
             # Python itself ignores SIGPIPE
@@ -91,6 +104,7 @@ def _handled() -> Iterator[list[int]]:
     try:
         yield received
     finally:
+        threading.excepthook = hook
         for number, handler in before.items():
             signal.signal(number, handler)
 

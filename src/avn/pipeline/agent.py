@@ -79,6 +79,8 @@ def agent_content(cfg: DictConfig) -> list[Any]:
         return []
     agent = build_agent(cfg)
     assert isinstance(agent, External)
+    if not agent.policy:  # which `check_agent` refuses
+        return []
     files = policy_files(agent.policy, agent.settings)
     return [{name: file_hash(path) for name, path in files.items()}]
 
