@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         make_simulator,
         render_clip,
         scene_names,
+        train,
     )
     from avn.navigation import metrics
     from avn.navigation.simulator import Simulator
@@ -43,6 +44,7 @@ _PUBLIC = {
     "render_clip": "avn.library",
     "scene_names": "avn.library",
     "summarise": "avn.reporting.results",
+    "train": "avn.library",
 }
 __all__ = [
     "Simulator",
@@ -56,6 +58,7 @@ __all__ = [
     "render_clip",
     "scene_names",
     "summarise",
+    "train",
 ]
 
 

@@ -30,6 +30,8 @@ from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.pipeline.apartments import Apartments, PerApartment
 from avn.pipeline.audio_inference import HEARING_SEED
+from avn.pipeline.export import settings_of
+from avn.pipeline.models import model_of, train_model
 from avn.pipeline.observations import Observed
 from avn.pipeline.run import Evaluation, episodes_of
 from avn.pipeline.scenes import DirectSound, Geometry
@@ -116,7 +118,7 @@ def render_clip(
     realisation : int
         Number of the random draw.
     overrides : sequence of str
-        Settings of sound and microphone, such as `sound=path/to/file.wav`.
+        Settings of sound and microphone, such as `sound=path/to/file.wav`, and those of the scene.
 
     Returns
     -------
@@ -130,7 +132,8 @@ def render_clip(
     """
     cfg, given = compose_command("generate", overrides)
     with composing():
-        refuse_unread("generate", cfg, leaves(cfg, ["sound", "microphone", "acoustics"]), given)
+        heard = leaves(cfg, ["sound", "microphone"])
+        refuse_unread("generate", cfg, heard | settings_of(cfg), given)
     sounds = dry_sounds(cfg)
     names = list(sounds.names)
     if sound is not None and sound not in names:
@@ -146,6 +149,33 @@ def render_clip(
     spectra = brir_spectra(scene.brirs.gather(clip.source, clip.state), sounds.rate)
     clips: NDArray[np.float32] = renderer.render(spectra, clip)[0].numpy()
     return clips
+
+
+def train(model: str, overrides: Overrides = ()) -> dict[str, float]:
+    """Train a network or an actor-critic agent, or read it where it is trained.
+
+    Parameters
+    ----------
+    model : str
+        Model of `avn.train`, such as "sound_cnn" or "a3c_va".
+    overrides : sequence of str
+        Settings of `avn.train`, such as `sound_model.epochs=1`.
+
+    Returns
+    -------
+    dict of str to float
+        Metrics by name, as `avn.train` prints them.
+
+    Raises
+    ------
+    UserError
+        If there is no such model, or a setting cannot work.
+    """
+    cfg, given = compose_command("train", [*overrides, f"model={model}"])
+    stage = model_of(cfg)
+    with composing():
+        refuse_unread("train", cfg, {*stage.read(), "model.name"}, given)
+    return train_model(stage)
 
 
 def make_simulator(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from hydra import compose, initialize_config_dir
-from hydra.core.global_hydra import GlobalHydra
+from hydra import compose
 from omegaconf import DictConfig, OmegaConf
 
-from avn.config import option_files, registry
+from avn.config import option_files
 from avn.config.folder import conf_folder
+from avn.config.python import composing
 
 # Groups whose options a run names besides its row.
 _GROUPS = ("split", "acoustics", "protocol")
@@ -38,14 +38,5 @@ def default_config(cfg: DictConfig) -> DictConfig:
 
 @lru_cache(maxsize=64)
 def _composed(overrides: tuple[str, ...]) -> DictConfig:
-    registry.register()
-    running = GlobalHydra.instance().hydra  # of the command, with the user's config folders
-    GlobalHydra.instance().clear()
-    try:
-        with (
-            option_files.package_only(),
-            initialize_config_dir(str(conf_folder().resolve()), version_base="1.3"),
-        ):
-            return compose("eval", overrides=[*overrides])
-    finally:
-        GlobalHydra.instance().hydra = running
+    with option_files.package_only(), composing():
+        return compose("eval", overrides=[*overrides])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from importlib.util import find_spec
 
 from rich.console import Console
 from rich.progress import (
@@ -87,7 +88,7 @@ def progress_bar(
             progress.remove_task(task)
         return
     console = Console(file=sys.stderr)
-    if not console.is_terminal:
+    if not _shows_bars(console):
         with reported(Work(what, total, unit, done)) as work:
             yield work.advance
         return
@@ -107,9 +108,14 @@ def working(what: str) -> Iterator[None]:
     what : str
         Description of the work.
     """
-    terminal = _shared or Console(file=sys.stderr).is_terminal
-    with nullcontext() if terminal else reported(Work(what)):
+    bars = _shared or _shows_bars(Console(file=sys.stderr))
+    with nullcontext() if bars else reported(Work(what)):
         yield
+
+
+def _shows_bars(console: Console) -> bool:
+    """Return whether bars can be drawn: in a terminal, and in a notebook with ipywidgets."""
+    return console.is_terminal or (console.is_jupyter and find_spec("ipywidgets") is not None)
 
 
 def log(line: str) -> None:
