@@ -16,7 +16,7 @@ def run(monkeypatch, capsys, *arguments):
 
 def test_the_commands_are_those_of_the_package_and_are_listed(monkeypatch, capsys):
     modules = {path.stem for path in Path(avn.__file__).parent.glob("*.py")}
-    assert modules - {"__init__", "__main__"} == set(COMMANDS)
+    assert modules - {"__init__", "__main__", "library"} == set(COMMANDS)
     for arguments in ((), ("--help",)):
         code, out, _ = run(monkeypatch, capsys, *arguments)
         assert code == 0

@@ -9,10 +9,12 @@ import pytest
 import soundfile
 
 from avn.acoustics.dry_sounds import content_hash, read_sound
+from avn.config.defaults import default_config
 from avn.config.saved import read_config
 from avn.core.errors import UserError
 from avn.pipeline.recordings import FILE
-from avn.pipeline.replay import open_run, settings_but_seed
+from avn.pipeline.replay import open_run
+from avn.pipeline.run_names import settings_but_seed
 
 
 def write_tone(path, frequency):
@@ -39,7 +41,8 @@ def run(command, outputs, tmp_path, monkeypatch):
 
 
 def opened(folder):
-    return open_run(folder, read_config(folder))
+    cfg = read_config(folder)
+    return open_run(folder, cfg, default_config(cfg))
 
 
 def heard(folder):

@@ -38,17 +38,33 @@ def register_when_imported() -> None:
 class _Gymnasium(MetaPathFinder):
     """Finder that leaves Gymnasium to the others and registers the environment afterwards."""
 
+    def __init__(self) -> None:
+        self._asks_others = False
+
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        """Find the module `gymnasium`; see `MetaPathFinder`."""
-        if name != "gymnasium":
+        """Find the module `gymnasium`.
+
+        Parameters
+        ----------
+        name : str
+            Full name of a module.
+        path, target
+            See `MetaPathFinder`; not used.
+        """
+        if name != "gymnasium" or self._asks_others:
             return None
-        sys.meta_path.remove(self)
-        spec = find_spec(name)
+        self._asks_others = True
+        try:
+            spec = find_spec(name)
+        finally:
+            self._asks_others = False
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 
             def execute_and_register(module: ModuleType) -> None:
                 execute(module)
+                # not before: a program may look for the module and not import it
+                sys.meta_path.remove(self)
                 register()
 
             spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]
