@@ -81,3 +81,16 @@ def test_the_cause_is_found_behind_what_others_raised():
     error.__cause__ = UserError("file: broken; mend it")
     assert cli.explain(error) == "file: broken; mend it"
     assert cli.explain(RuntimeError("a bug")) is None
+
+
+@pytest.mark.parametrize("flag", ["--hepl", "-x", "--config-dri=here"])
+def test_a_flag_that_does_not_exist_is_one_line(command, flag):
+    code, _, err = command("eval", "agent=greedy", flag)
+    assert code == 2
+    assert len(err) == 1
+    assert err[0].startswith(f"avn.eval: {flag}: no such flag; there are --help")
+
+
+def test_flags_of_hydra_pass():
+    given = ["agent=greedy", "--cfg", "job", "-p", "agent", "--resolve"]
+    assert cli.arrange(given) == given

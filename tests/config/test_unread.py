@@ -101,3 +101,17 @@ def test_the_test_world_is_not_changed_through_the_training_world(command, tmp_p
     options = ("agent=greedy", "training.acoustics.rays=300", f"outputs={tmp_path}/o")
     line = missing_error(command, "eval", *options)
     assert "choose its own first, such as training.acoustics=resonance" in line
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ("sound=alarm", "give training.sounds;"),
+        ("sound=nowhere.wav", "give training.sounds;"),
+        ("microphone.gain=2", "give training.microphone.gain;"),
+    ],
+)
+def test_a_training_names_the_setting_of_its_own_world(command, given, wanted):
+    code, _, err = command("train", "model=sound_cnn", given)
+    assert code == 2
+    assert wanted in err[-1]

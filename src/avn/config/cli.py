@@ -39,7 +39,13 @@ TRAINING = {
     "training.microphone": "microphone@training.microphone",
     "training.sounds": "sound@training.sounds",
 }
+# Flags of Hydra's parser, without those that `arrange` and `option_files` take.
+_FLAGS = re.compile(
+    r"-[cprih]+|--(cfg|package|resolve|run|info|hydra-help|version|shell-completion|config-path"
+    r"|config-name|experimental-rerun)(=.*)?|-c[pn]"
+)
 LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments")
+_SWEEP = ("-m", "--multirun")
 USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
 
 
@@ -159,10 +165,15 @@ def arrange(arguments: Iterable[str]) -> list[str]:
     for argument in arguments:
         check_text(argument)
         key, equals, value = argument.partition("=")
+        if argument.startswith("-") and not _FLAGS.fullmatch(argument) and argument not in _SWEEP:
+            raise UserError(
+                f"{argument}: no such flag; there are --help, -m, --config-dir FOLDER and --cfg "
+                "job, and settings are given as KEY=VALUE"
+            )
         renamed.check_name(key.lstrip("+~"))
         if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
             raise UserError(f"{argument}: name an option, such as 'none'; there are {groups[key]}")
-        if argument in ("-m", "--multirun"):
+        if argument in _SWEEP:
             sweep = ["--multirun"]
         elif equals and key in LIST_KEYS and not value.startswith("["):
             rest.append(f"{key}=[{value}]")

@@ -16,6 +16,8 @@ from avn.core.settings import leaves, plain
 
 # Groups that select what a command does; they may set keys that it does not read.
 _CHOOSE = ("agent", "model", "experiment")
+# Settings of the training world that have a default of their own.
+_OF_TRAINING = {"sound": "training.sounds", "microphone": "training.microphone"}
 
 
 def refuse_unread(
@@ -41,7 +43,7 @@ def refuse_unread(
     """
     for setting in spare.settings() if given is None else ():
         if (key := setting.split("=")[0]) not in read:
-            raise _unread(key, cfg, read)
+            raise _unread(command, key, cfg, read)
     given = list(HydraConfig.get().overrides.task) if given is None else list(given)
     suspects = [
         override
@@ -57,18 +59,20 @@ def refuse_unread(
         here, there = leaves(cfg, [key]), leaves(default, [key])
         changed = {leaf for leaf in here | there if plain(cfg, leaf) != plain(default, leaf)}
         if changed and not changed & set(read):
-            raise _unread(key, cfg, read)
+            raise _unread(command, key, cfg, read)
 
 
-def _unread(key: str, cfg: DictConfig, read: Collection[str]) -> UserError:
+def _unread(command: str, key: str, cfg: DictConfig, read: Collection[str]) -> UserError:
     return UserError(
-        f"{key}: not read by this run, {_reason(key, cfg)}; the run reads "
+        f"{key}: not read by this run, {_reason(command, key, cfg)}; the run reads "
         f"{', '.join(summary(cfg, read))}"
     )
 
 
-def _reason(key: str, cfg: DictConfig) -> str:
+def _reason(command: str, key: str, cfg: DictConfig) -> str:
     group = key.split(".")[0]
+    if command == "train" and (own := _OF_TRAINING.get(group)):
+        return f"which trains in the training world; give {own}{key[len(group) :]}"
     node = cfg.get(group)
     if isinstance(node, DictConfig) and "_target_" in node and node["_target_"] is None:
         return f"which has no {group} ({group}=none)"
