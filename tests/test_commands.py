@@ -124,13 +124,13 @@ def test_a_sweep_keeps_unlike_runs_apart(command, outputs):
         f"outputs={outputs}",
         "sound=alarm",
         "protocol.num_starts=5,10",
-        "seed=0,1",
+        "seed=0,1,2",
         "-m",
     )
     assert code == 0, err
     lines = [line for line in out if line.startswith("random_walk, alarm (")]
     assert len(lines) == 2
-    assert all("2 seeds" in line for line in lines)
+    assert all("3 seeds" in line for line in lines)
 
 
 def test_any_audio_file_is_a_sound(command, outputs, tmp_path):

@@ -19,14 +19,13 @@ from avn.core.errors import UserError
 def composing() -> Iterator[None]:
     """Make `hydra.compose` read the configs of this package, also in a program that uses Hydra."""
     registry.register()
-    hydra = GlobalHydra.instance()
-    outer = hydra.hydra
-    hydra.clear()
+    outer = GlobalHydra.instance().hydra
+    GlobalHydra.instance().clear()
     try:
         with initialize_config_dir(str(conf_folder().resolve()), version_base="1.3"):
             yield
     finally:
-        hydra.hydra = outer
+        GlobalHydra.instance().hydra = outer  # Hydra may have replaced the instance
 
 
 def compose_command(command: str, overrides: Sequence[str]) -> tuple[DictConfig, list[str]]:

@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from hydra import compose, initialize_config_dir
-from hydra.core.global_hydra import GlobalHydra
+from hydra import compose
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from avn.config import registry, schema
-from avn.config.folder import conf_folder
+from avn.config import schema
+from avn.config.python import composing
 from avn.config.signatures import is_option, with_signature
 from avn.core.errors import UserError
 
@@ -46,12 +45,8 @@ def read_config(folder: Path) -> DictConfig:
 
 def _typed(plain: Any) -> DictConfig:
     """Return a saved config with the schema of each group; new keys have their defaults."""
-    registry.register()
-    if GlobalHydra.instance().is_initialized():
+    with composing():
         cfg = compose("eval")
-    else:
-        with initialize_config_dir(str(conf_folder()), version_base="1.3"):
-            cfg = compose("eval")
     for key, value in plain.items():
         if isinstance(value, DictConfig) and isinstance(cfg.get(key), DictConfig):
             cfg[key] = _with_schema(str(key), value, cfg[key])
