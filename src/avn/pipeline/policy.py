@@ -70,6 +70,7 @@ class Policy(Trained):
     """Stage of the network of an actor-critic agent."""
 
     kind = "train/policy"
+    version = 2
 
     @property
     def name(self) -> str:
