@@ -61,6 +61,8 @@ def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(com
         assert settings["agent"].string_value == agent
         assert settings["seed"].number_value == 0
         assert list(settings)[:4] == ["agent", "sound", "protocol", "acoustics"]
+        # TensorBoard sorts the columns by name and shows five
+        assert sorted(settings)[:5] == ["acoustics", "agent", "protocol", "seed", "sound"]
         assert metrics[:2] == ["success", "spl"]
         assert {"success", "spl", "by_distance/spl"} <= set(found.Runs()[run]["scalars"])
         # a curve over the distance of the start in metres, and no dots of single scenes
@@ -68,7 +70,7 @@ def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(com
         assert steps == sorted(steps)
         assert len(steps) > 2
         assert not [tag for tag in found.Runs()[run]["scalars"] if tag.count("/") == 2]
-        assert (settings["localisation"].string_value != "") == (agent == "ours_exp")
+        assert (settings["with_localisation"].string_value != "") == (agent == "ours_exp")
     first = (list(settings), metrics)
     drawn = found.Runs()[str(Path(greedy).relative_to(outputs))]["images"]
     assert any(tag.startswith("figures/") for tag in drawn)
@@ -78,7 +80,7 @@ def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(com
     for name, tags in heard.items():
         assert name.split("/")[2] == "sound_cnn-resonance-mini-ring+alarm+clock-seed0"
         settings, metrics = hparams(found, name)
-        assert settings["kind"].string_value == "training"
+        assert settings["with_kind"].string_value == "training"
         assert settings["sounds_in_training"].string_value == "ring+alarm+clock"
         # the columns of all rows of the HPARAMS tab are the same
         assert (list(settings), metrics) == first

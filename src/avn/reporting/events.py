@@ -1,7 +1,8 @@
 """TensorBoard events of runs and trainings, which share the table of the HPARAMS tab.
 
 TensorBoard takes the columns of that table from one of the folders. All folders therefore declare
-the same columns, in the same order.
+the same columns. It sorts them by name and shows the first five; the names of others begin with
+`with_`, so that these are acoustics, agent, protocol, seed and sound.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ SETTINGS: dict[str, type] = {
     "episodes": str,
     "subset": str,
 }
+# Settings whose names would sort before `sound`.
+_BEHIND = ("kind", "mapper", "planner", "look", "localisation", "exploration", "episodes")
 # Columns of metrics: of runs, and the best value by which a training is judged.
 METRICS = ("success", "spl", "softspl", "sna", "dtg", "best_validation")
 
@@ -64,7 +67,10 @@ def write_summary(
     if suffix:
         for old in folder.glob(f"events.*{suffix}"):
             old.unlink()
-    row = {key: kind(settings.get(key, kind())) for key, kind in SETTINGS.items()}
+    row = {
+        f"with_{key}" if key in _BEHIND else key: kind(settings.get(key, kind()))
+        for key, kind in SETTINGS.items()
+    }
     with SummaryWriter(str(folder), filename_suffix=suffix) as writer:
         assert writer.file_writer is not None
         for summary in hparams(row, dict.fromkeys(METRICS)):
