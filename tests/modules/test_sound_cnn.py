@@ -115,7 +115,7 @@ def test_hyperparameters_are_plain() -> None:
 
 
 def test_every_recipe_key_reaches_the_model() -> None:
-    assert set(build().hparams) - {"rate"} == set(config()) - {"_target_"}
+    assert set(build().hparams) - {"rate"} == set(config()) - {"_target_", "ckpt_path"}
 
 
 @pytest.mark.parametrize(

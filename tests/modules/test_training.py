@@ -6,47 +6,19 @@ from typing import Any
 import pytest
 import torch
 from lightning.pytorch.callbacks import Callback
-from omegaconf import DictConfig
-from small import option
-from synthetic_scene import synthetic_scene, synthetic_sounds
+from small_training import build, loggers, weights
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from avn.acoustics.microphone import Microphone
-from avn.core.classes import build_object
 from avn.core.errors import UserError
-from avn.core.settings import typed
 from avn.core.signals import exit_code_of
-from avn.datamodules.sound import SoundData
-from avn.modules.sound_cnn import SoundCnn
 from avn.modules.training import BEST, LAST, fit, load_weights
 from avn.reporting.sound_figures import SoundFigures
-
-
-def recipe(**changes: Any) -> DictConfig:
-    config = option("sound_model", "cnn5", epochs=4, batch=16, validation_clips=60)
-    config.optimizer.lr, config.net.dropout = 3e-3, 0.1
-    config.spectrogram.bands = config.spectrogram.frames = 16
-    config.net.widths, config.net.hidden = [8, 8, 8, 8, 8], [16]
-    for key, value in changes.items():
-        setattr(config, key, value)
-    return config
-
-
-def build(rate: int = 16000, **changes: Any) -> tuple[SoundData, SoundCnn]:
-    config = recipe(**changes)
-    scenes = [synthetic_scene("a", rate=rate)], [synthetic_scene("b", 2.5, rate)]
-    data = SoundData(*scenes, synthetic_sounds(rate), Microphone(), typed(config))
-    return data, build_object("sound_model", config, rate=rate)
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("run")
-    return folder, fit(*build(), folder, [SoundFigures()])
-
-
-def weights(path: Path) -> dict[str, torch.Tensor]:
-    return torch.load(path, weights_only=True)["state_dict"]
+    return folder, fit(*build(), folder, [SoundFigures()], loggers(folder, "tensorboard"))
 
 
 @pytest.mark.parametrize("rate", [8000, 48000])
@@ -82,7 +54,9 @@ def test_metrics_are_by_split_sight_and_sound(run: tuple[Path, dict[str, Any]]) 
 
 def test_tensorboard_holds_scalars_figures_and_audio(run: tuple[Path, dict[str, Any]]) -> None:
     folder, metrics = run
-    events = EventAccumulator(str(folder), size_guidance={"images": 0, "audio": 0}).Reload()
+    events = EventAccumulator(
+        str(folder / "a-run"), size_guidance={"images": 0, "audio": 0}
+    ).Reload()
     tags = events.Tags()
     wanted = {name for name in metrics if "/" in name} | {"loss/steps"}
     assert wanted <= set(tags["scalars"])

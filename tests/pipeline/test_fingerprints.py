@@ -79,6 +79,10 @@ def moved(override):
         ("outputs=elsewhere", NONE),
         ("processes=1", NONE),
         ("auto=false", NONE),
+        ("trainer=cpu", NONE),
+        ("trainer.profiler=simple", NONE),
+        ("logger=[csv,tensorboard]", NONE),
+        ("logger=none", NONE),
         ("protocol.radius=3", NONE),  # of another goal
         ("planner.error.sigma=3", NONE),  # of another filter
         ("stop_model.criterion=balanced", RUN),
@@ -107,6 +111,9 @@ def test_how_an_agent_acts_is_no_part_of_what_it_learnt(override, wanted):
         ("occupancy_model.appearances=3", {"occupancy", "patches"}),
         ("renderer.camera.pitch=-20", SEEN),
         ("backbone.size=64", {"embeddings", "run", "policy", "policy_map"}),
+        ("trainer.max_epochs=3", {*EARS, "occupancy", *LOOKING}),
+        ("trainer.precision=bf16-mixed", {*EARS, "occupancy", *LOOKING}),
+        ("callbacks=learning_rate", {*EARS, "occupancy", *LOOKING}),
         ("algorithm.gamma=0.9", {"policy", "policy_map"}),
         ("algorithm.exploration_walks=3", NONE),  # neither explores
         ("mapper.visible_above=0.2", {"run_windows", "policy_map"}),
@@ -252,6 +259,30 @@ def test_two_rows_never_share_a_folder():
     assert one.fingerprint != other.fingerprint
 
 
+def test_the_checkpoint_that_a_training_goes_on_from_counts_by_its_content(tmp_path):
+    paths = [tmp_path / name for name in ("a.ckpt", "b.ckpt", "c.ckpt")]
+    for path, text in zip(paths, ("one", "one", "two"), strict=True):
+        path.write_text(text)
+    for kind, key in ((SoundNetwork, "sound_model"), (Policy, "algorithm")):
+        options = ("agent=a3c_va", "split=mini")
+        found = [kind(composed(*options, f"{key}.ckpt_path={path}")) for path in paths]
+        usual, one, same, other = (
+            stage.fingerprint for stage in (kind(composed(*options)), *found)
+        )
+        assert one == same
+        assert len({usual, one, other}) == 3
+
+
+def test_a_network_of_the_default_trainer_is_the_one_of_old():
+    """Its fingerprint, and with it the networks that users have, must not change."""
+    changed = composed("agent=greedy", "split=mini", "trainer.precision=32-true", "logger=none")
+    assert (
+        SoundNetwork(changed).inputs()
+        == SoundNetwork(composed("agent=greedy", "split=mini")).inputs()
+    )
+    assert not any("trainer" in str(value) for value in SoundNetwork(changed).inputs())
+
+
 @pytest.mark.parametrize("kind", [SoundNetwork, StopNetwork])
 def test_the_acoustics_of_the_training_world_are_read_where_they_follow_the_test(kind):
     read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini")).read()
@@ -285,6 +316,12 @@ def test_the_acoustics_of_the_training_world_are_read_where_they_follow_the_test
         (("agent=ours_noexp", "sound_model.schedule=foo"), "schedule"),
         (("agent=ours_noexp", "occupancy_model.appearances=0"), "occupancy_model.appearances: 0"),
         (("agent=greedy", "realisations=0"), "realisations: 0 is out of range"),
+        (("agent=greedy", "trainer.devices=2"), "trainer.devices: 2"),
+        (("agent=greedy", "trainer.precision=half"), "trainer.precision: 'half'"),
+        (("agent=greedy", "sound_model.ckpt_path=nowhere"), "nowhere: no such file"),
+        (("agent=a3c_v", "algorithm.ckpt_path=nowhere"), "nowhere: no such file"),
+        (("agent=a3c_v", "logger=csv", "+logger.csv.foo=1"), "logger.csv.foo: no such setting"),
+        (("agent=greedy", "callbacks=timer", "+callbacks.timer.foo=1"), "callbacks.timer.foo: no"),
     ],
 )
 def test_what_cannot_work_is_refused_before_anything_is_made(overrides, line, tmp_path):

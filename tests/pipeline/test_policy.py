@@ -10,7 +10,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from avn.pipeline.trained import METRICS
 from avn.reporting.model_card import CARD
-from avn.rl.training import BEST, CURVE, LAST
+from avn.rl.checkpoints import BEST, CURVE, LAST
 
 ROWS = ("a3c_v", "a3c_va", "a3c_va_mapper", "a3c_va_m", "a3c_va_m_mapper")
 # One take of each clip, and sounds that the tests name.

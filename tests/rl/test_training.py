@@ -2,17 +2,22 @@ import os
 import signal
 import time
 
+import pandas as pd
 import pytest
 import torch
+from small_training import loggers
 from small_worlds import make_spec, make_trajectories, make_worker, random_tables
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from torch.nn import functional as F
 
 from avn.core.errors import UserError
 from avn.navigation.reward import RewardConfig
 from avn.rl import worker_pool
+from avn.rl.checkpoints import BEST, LAST, load_network, read_checkpoint
+from avn.rl.curve import best_of
 from avn.rl.networks import ActorCritic, sample
 from avn.rl.shared import SharedState
-from avn.rl.training import BEST, LAST, Training, best_of, load_network, read_checkpoint
+from avn.rl.training import Training
 
 
 def measure(network):
@@ -275,6 +280,66 @@ def test_several_gradients_of_a_batch_count_its_actions_once(flat, rules, tmp_pa
 def test_the_kept_network_is_a_trained_one_and_the_latest_of_equal_ones(spl, kept):
     curve = [{"validation/spl": value} for value in spl]
     assert best_of(curve) is curve[kept]
+
+
+def test_a_training_goes_on_from_another_one(flat, rules, tmp_path):
+    tables = random_tables([flat], rules)
+    first = training(make_spec(tables, rules, total_steps=600, validate_every=300), tmp_path / "a")
+    first.run()
+    spec = make_spec(tables, rules, total_steps=1500, validate_every=300)
+    torch.manual_seed(3)
+    network, start = ActorCritic(spec.network_spec), tmp_path / "a" / LAST
+
+    def going_on():
+        return Training(spec, network, tmp_path / "b", measure, "b" * 64, start=start)
+
+    second = going_on()
+    assert torch.equal(second.shared.weights, first.shared.weights)
+    assert torch.equal(second.shared.moments, first.shared.moments)
+    assert second.steps == 600
+    interrupted = second.run(rounds=1)
+    assert [own["steps"] for own in interrupted] == [600, 900]
+    start.unlink()  # from here on it has a checkpoint of its own
+    curve = going_on().run()
+    assert [own["steps"] for own in curve] == [600, 900, 1200, 1500]
+    # the first network of the curve is the one from which it goes on
+    assert curve[0]["validation/spl"] == first.curve[-1]["validation/spl"]
+
+
+def test_a_start_that_cannot_be_is_refused(flat, rules, tmp_path):
+    tables = random_tables([flat], rules)
+    training(make_spec(tables, rules, total_steps=600), tmp_path / "a").run()
+    for path, options, line in (
+        (tmp_path / "a" / BEST, {"total_steps": 900}, "is no last checkpoint of an actor-critic"),
+        (tmp_path / "a" / LAST, {"total_steps": 600}, "has 600 actions, and the training ends af"),
+        (tmp_path / "a" / LAST, {"total_steps": 620}, "give more algorithm.total_steps"),
+        (tmp_path / "a" / LAST, {"total_steps": 900, "memory": 5}, "is of another network, with"),
+    ):
+        spec = make_spec(tables, rules, **options)
+        with pytest.raises(UserError, match=line):
+            Training(spec, ActorCritic(spec.network_spec), tmp_path / "b", measure, "b", start=path)
+
+
+def test_every_logger_gets_the_curve(flat, rules, tmp_path):
+    spec = make_spec(random_tables([flat], rules), rules, total_steps=600, validate_every=300)
+    steps = []
+
+    def opened(step):
+        steps.append(step)
+        return loggers(tmp_path, "csv", "tensorboard")
+
+    torch.manual_seed(1)
+    network = ActorCritic(spec.network_spec)
+    run = Training(spec, network, tmp_path, measure, "a" * 64, opened)
+    run.run(rounds=1)
+    Training(spec, network, tmp_path, measure, "a" * 64, opened).run()
+    assert steps == [1, 301]
+    events = EventAccumulator(str(tmp_path / "a-run")).Reload().Scalars("validation/spl")
+    assert [event.step for event in events] == [0, 300, 600]
+    tables = [pd.read_csv(tmp_path / "csv" / f"version_{n}" / "metrics.csv") for n in (0, 1)]
+    found = pd.concat(tables).dropna(subset="validation/spl")
+    assert found["step"].tolist() == [0, 300, 600]
+    assert found["validation/spl"].tolist() == pytest.approx([own.value for own in events])
 
 
 def test_the_file_is_that_of_the_kept_network(flat, rules, tmp_path):

@@ -27,6 +27,7 @@ from avn.config import renamed, spare
 from avn.config.audio_source import name_files, quoted
 from avn.config.folder import conf_folder, without_folders
 from avn.config.help import help_text, is_asked
+from avn.config.option_files import option_names
 from avn.core.errors import UserError
 from avn.core.files import write_failure
 from avn.core.signals import exit_code_of
@@ -44,7 +45,9 @@ _FLAGS = re.compile(
     r"-[cprih]+|--(cfg|package|resolve|run|info|hydra-help|version|shell-completion|config-path"
     r"|config-name|experimental-rerun)(=.*)?|-c[pn]"
 )
-LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments")
+# Groups of which several options can be chosen at once.
+SEVERAL = ("logger", "callbacks")
+LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments", *SEVERAL)
 _SWEEP = ("-m", "--multirun")
 USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
 
@@ -173,6 +176,8 @@ def arrange(arguments: Iterable[str]) -> list[str]:
         renamed.check_name(key.lstrip("+~"))
         if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
             raise UserError(f"{argument}: name an option, such as 'none'; there are {groups[key]}")
+        if key in SEVERAL and equals:
+            _check_options(argument, key, value)
         if argument in _SWEEP:
             sweep = ["--multirun"]
         elif equals and key in LIST_KEYS and not value.startswith("["):
@@ -185,6 +190,16 @@ def arrange(arguments: Iterable[str]) -> list[str]:
             rest.append(argument)
     _check_training(rest)
     return sweep + rest
+
+
+def _check_options(argument: str, group: str, value: str) -> None:
+    """Refuse an option that does not exist; Hydra's own message of a list names no others."""
+    known = option_names(group)
+    for name in value.strip("[]").replace(" ", "").split(","):
+        if name and name not in known:
+            raise UserError(
+                f"{argument}: there is no '{name}' in {group}; there are {', '.join(known)}"
+            )
 
 
 def check_text(argument: str) -> None:

@@ -42,6 +42,12 @@ def take_folders(arguments: list[str]) -> list[str]:
     return rest
 
 
+def option_names(group: str) -> list[str]:
+    """Return the names of the options of a group, those of the user's folders among them."""
+    places = [*map(Path, _folders), conf_folder()]
+    return sorted({path.stem for place in places for path in (place / group).glob("*.yaml")})
+
+
 @contextmanager
 def package_only() -> Iterator[None]:
     """Leave the config folders of the command line out of what is composed in the block."""

@@ -13,6 +13,7 @@ from omegaconf import II, MISSING
 
 from avn.acoustics.settings import AcousticsConfig
 from avn.apartments.settings import SplitConfig
+from avn.modules.settings import TrainerConfig
 from avn.views.settings import BackboneConfig, RendererConfig
 
 _TEST_SPLIT: Any = II("split")
@@ -43,6 +44,34 @@ class NamedOption(Option):
     """
 
     name: str = MISSING
+
+
+@dataclass
+class NetworkOption(NamedOption):
+    """Option of a group of networks.
+
+    Attributes
+    ----------
+    ckpt_path : str, optional
+        Checkpoint of another training, `best.ckpt` or `last.ckpt`, from which that of this network
+        goes on: weights, optimiser, number of epochs.
+    """
+
+    ckpt_path: str | None = None
+
+
+@dataclass
+class AlgorithmOption(Option):
+    """Option of the group `algorithm`.
+
+    Attributes
+    ----------
+    ckpt_path : str, optional
+        Checkpoint `last.ckpt` of another training, from which this one goes on: weights, moments,
+        number of actions.
+    """
+
+    ckpt_path: str | None = None
 
 
 @dataclass
@@ -126,6 +155,9 @@ class CoreConfig:
     ----------
     sound : dict of str to str
         Recording of each sound by its name: a built-in recording or the path of an audio file.
+    logger, callbacks : dict
+        Loggers and further callbacks of trainings by name, each with `_target_` and arguments of
+        that class.
     """
 
     split: SplitConfig = MISSING
@@ -148,6 +180,9 @@ class CoreConfig:
     localisation: str = MISSING
     realisations: int = MISSING
     train_seed: int = MISSING
+    trainer: TrainerConfig = MISSING
+    logger: dict[str, Any] = MISSING
+    callbacks: dict[str, Any] = MISSING
     policy: str | None = None
     outputs: str = MISSING
     processes: int = MISSING
@@ -169,6 +204,7 @@ class TrainConfig(CoreConfig):
     """Schema of `train.yaml`."""
 
     model: ModelConfig = MISSING
+    ckpt_path: str | None = None
     # Row whose agent is trained, for `model=a3c_v` and the like.
     agent: AgentConfig = field(default_factory=lambda: AgentConfig(name="none"))
 
@@ -198,14 +234,14 @@ class ReproduceConfig(CoreConfig):
 
 # Schema that all options of a group share.
 BASES: dict[str, type] = {
-    "sound_model": NamedOption,
-    "stop_model": NamedOption,
-    "occupancy_model": NamedOption,
+    "sound_model": NetworkOption,
+    "stop_model": NetworkOption,
+    "occupancy_model": NetworkOption,
     "mapper": MapperOption,
     "planner": NamedOption,
     "baseline": Option,
     "protocol": NamedOption,
-    "algorithm": Option,
+    "algorithm": AlgorithmOption,
     "microphone": Option,
     "renderer": RendererConfig,
     "backbone": BackboneConfig,
@@ -244,4 +280,4 @@ COMMANDS = {
     "reproduce": ReproduceConfig,
 }
 # Groups whose options are instances of one dataclass.
-SCHEMAS = {"split": SplitConfig, "acoustics": AcousticsConfig}
+SCHEMAS = {"split": SplitConfig, "acoustics": AcousticsConfig, "trainer": TrainerConfig}

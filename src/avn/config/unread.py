@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from typing import Any
 
 from hydra import compose
 from hydra.core.hydra_config import HydraConfig
@@ -48,7 +49,8 @@ def refuse_unread(
     suspects = [
         override
         for override in OverridesParser.create().parse_overrides(given)
-        if override.key_or_group not in _CHOOSE and not leaves(cfg, [_key(override)]) <= set(read)
+        if override.key_or_group not in _CHOOSE
+        and not set() < leaves(cfg, [_key(override)]) <= set(read)
     ]
     if not suspects:
         return
@@ -56,10 +58,19 @@ def refuse_unread(
     default = compose(command, overrides=chosen)
     for override in suspects:
         key = _key(override)
-        here, there = leaves(cfg, [key]), leaves(default, [key])
-        changed = {leaf for leaf in here | there if plain(cfg, leaf) != plain(default, leaf)}
+        if not leaves(cfg, [key]):  # sets keys of other nodes, such as debug=overfit
+            alone = compose(command, overrides=[*chosen, str(override.input_line)])
+            for unread in sorted(_changed(alone, default, [*alone]) - set(read)):
+                raise _unread(command, unread, cfg, read)
+        changed = _changed(cfg, default, [key])
         if changed and not changed & set(read):
             raise _unread(command, key, cfg, read)
+
+
+def _changed(cfg: DictConfig, default: DictConfig, keys: Sequence[Any]) -> set[str]:
+    """Return the leaves at or below some keys in which two configs differ."""
+    found = leaves(cfg, keys) | leaves(default, keys)
+    return {leaf for leaf in found if plain(cfg, leaf) != plain(default, leaf)}
 
 
 def _unread(command: str, key: str, cfg: DictConfig, read: Collection[str]) -> UserError:

@@ -55,7 +55,8 @@ def _without(value: Any, key: str, ignored: Sequence[str]) -> Any:
 def leaves(cfg: DictConfig, keys: Sequence[str], ignored: Sequence[str] = ()) -> set[str]:
     """Return the dotted keys of all leaves at or below some keys, and of those they refer to.
 
-    If `mapper.localisation` is `${localisation}`, the leaves of both are returned.
+    If `mapper.localisation` is `${localisation}`, the leaves of both are returned. A node without
+    keys is a leaf.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def _leaves(cfg: DictConfig, key: str, ignored: set[str], below: bool = False) -
     for other, hidden in _referred(cfg, key, ignored, below):
         yield from _leaves(cfg, other, hidden)
     value = OmegaConf.select(cfg, key)
-    if isinstance(value, DictConfig):
+    if isinstance(value, DictConfig) and len(value):
         for child in map(str, value):
             yield from _leaves(cfg, below_key(key, child), ignored, below=True)
     elif below or _holds(cfg, key):

@@ -23,7 +23,7 @@ from avn.core.hashing import file_hash
 # Keys whose values name a class, as `module.name`, or a policy of the user, as `module:name`.
 TARGET, POLICY = "_target_", "policy"
 # Packages whose classes stand in the options of the package itself.
-_VERSIONED = ("avn", "torch")
+_VERSIONED = ("avn", "torch", "lightning")
 # Classes as they were imported, or None, and their hashes.
 _known: dict[str, tuple[Any, str]] = {}
 

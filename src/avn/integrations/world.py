@@ -29,7 +29,8 @@ from avn.pipeline.agent import build_agent
 from avn.pipeline.apartments import TEST, TRAINING, Apartments
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.observations import OBSERVATIONS, OWN, Observed
-from avn.pipeline.policy import build_algorithm, learns
+from avn.pipeline.policy import learns
+from avn.pipeline.policy_data import build_algorithm
 from avn.pipeline.run import episodes_of
 from avn.pipeline.scenes import Geometry
 from avn.pipeline.sounds import sound_files

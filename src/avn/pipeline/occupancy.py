@@ -48,6 +48,7 @@ class OccupancyNetwork(Fitted):
     """Stage of the network that estimates which cells ahead are free and which visible."""
 
     kind = "train/occupancy_cnn"
+    node = "occupancy_model"
 
     def check(self) -> None:
         """Refuse a config without an occupancy network."""
@@ -82,8 +83,9 @@ class OccupancyNetwork(Fitted):
         """Estimate the duration from the views of an epoch, trained on and measured."""
         recipe = self.cfg.occupancy_model
         views = [4 * apartments.cells for apartments in (self.train, self.validation)]
-        measured = sum(min(count, recipe.validation_views) for count in views)
-        return float(recipe.epochs * (views[0] * recipe.times + measured) / VIEWS_PER_SECOND)
+        measured = sum(self.in_epoch(min(count, recipe.validation_views)) for count in views)
+        trained = self.in_epoch(views[0] * recipe.times)
+        return float(self.epochs * (trained + measured) / VIEWS_PER_SECOND)
 
     def untrained(self) -> OccupancyCnn:
         """Return the network with its initial weights."""

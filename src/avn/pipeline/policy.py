@@ -4,52 +4,39 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-import torch
-from omegaconf import DictConfig, OmegaConf
-from torch import Tensor
+from omegaconf import DictConfig
 
 from avn.agents.actor_critic import ActorCriticAgent
-from avn.agents.rollout import Labels, rollout_scene
-from avn.core.classes import build_object, import_class
+from avn.core.classes import import_class
 from avn.core.errors import UserError
 from avn.core.files import check_name
 from avn.core.progress import log
 from avn.core.settings import plain
-from avn.dataset.scene import Scene
 from avn.mapping.ego_map import EgoMap
-from avn.navigation.episodes import frozen_episodes
-from avn.navigation.protocols import Protocol
-from avn.navigation.reward import RewardConfig
-from avn.navigation.scene_batch import SceneBatch
-from avn.pipeline.apartments import TRAINING
 from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.policy_data import (
     SUBSETS,
-    actor_critic,
+    build_algorithm,
     check_observations,
-    feature_sizes,
-    load_subset,
+    network_spec,
     observation_names,
     observed,
     subset_stages,
-    tables_of,
 )
 from avn.pipeline.sound_network import has_sound_model
-from avn.pipeline.sounds import sound_files
 from avn.pipeline.trained import METRICS, Trained
+from avn.rl.curve import MONITOR, best_of
 
 if TYPE_CHECKING:
-    from avn.rl.algorithm import Algorithm
-    from avn.rl.networks import ActorCritic, NetworkSpec
+    from lightning.pytorch.loggers import Logger
 
-# Seed of the episodes on which an agent is evaluated during training.
-MEASURED_SEED = 0
-# Maximum number of rows from which mean and standard deviation of a feature are estimated.
-_EXAMPLES = 200_000
+    from avn.rl.algorithm import Algorithm
+    from avn.rl.networks import ActorCritic
 
 
 def learns(cfg: DictConfig) -> bool:
@@ -58,18 +45,11 @@ def learns(cfg: DictConfig) -> bool:
     return bool(target) and issubclass(import_class("baseline._target_", target), ActorCriticAgent)
 
 
-def build_algorithm(cfg: DictConfig) -> Algorithm:
-    """Build the algorithm of a config; raise `UserError` where there is none, or it cannot work."""
-    if not cfg.algorithm._target_:
-        raise UserError("algorithm: 'none' trains nothing; choose a3c")
-    algorithm: Algorithm = build_object("algorithm", cfg.algorithm)
-    return algorithm
-
-
 class Policy(Trained):
     """Stage of the network of an actor-critic agent."""
 
     kind = "train/policy"
+    node = "algorithm"
     version = 2
 
     @property
@@ -85,8 +65,6 @@ class Policy(Trained):
     @property
     def monitor(self) -> str:
         """Metric by which the best round is chosen."""
-        from avn.rl.training import MONITOR
-
         return MONITOR
 
     def check(self) -> None:
@@ -96,8 +74,13 @@ class Policy(Trained):
                 f"baseline: that of agent '{self.cfg.agent.name}' is no actor-critic; choose "
                 "model=a3c_va"
             )
+        super().check()
         check_name("agent.name", self.cfg.agent.name)
-        build_algorithm(self.cfg)
+        recipe = build_algorithm(self.cfg)
+        if self.start is not None and not self.begun():
+            from avn.rl.checkpoints import read_start
+
+            read_start(self.start, recipe)
         check_observations(self.cfg)
         if self.cfg.baseline.memory and not self.cfg.protocol.exploration_steps:
             raise UserError(
@@ -153,7 +136,46 @@ class Policy(Trained):
 
     def make(self) -> None:
         """Train the network, or resume an interrupted training."""
-        _train(self)
+        started = time.perf_counter()
+        curve, features = self._train(build_algorithm(self.cfg), self.folder, self.loggers)
+        self._warn(curve)
+        metrics: dict[str, Any] = {f"best/{key}": own for key, own in best_of(curve).items()}
+        metrics |= {f"untrained/{name}": value for name, value in curve[0].items()}
+        metrics |= {"features": features, "steps": curve[-1]["steps"]}
+        metrics |= {"seconds": time.perf_counter() - started}
+        nodes = {name: plain(self.cfg, name) for name in ("baseline", "algorithm", "protocol")}
+        self.finish(metrics, nodes)
+
+    def trial(self, batches: int) -> None:
+        """Train a few batches of each worker, and measure with one start of each source."""
+        recipe = build_algorithm(self.cfg)
+        steps = batches * recipe.batch * recipe.workers
+        short = dataclasses.replace(recipe, total_steps=steps, validation_starts=1)
+        with TemporaryDirectory() as parent:
+            self._train(short, Path(parent) / self.folder.name, lambda step: [])
+
+    def _train(
+        self, recipe: Algorithm, folder: Path, loggers: Callable[[int], Sequence[Logger]]
+    ) -> tuple[list[dict[str, float]], dict[str, int]]:
+        """Train in a folder; return the curve, and the size of each feature."""
+        from avn.pipeline.policy_training import prepare
+        from avn.rl.training import Training
+
+        spec, network, measure = prepare(self.cfg, recipe)
+        training = Training(spec, network, folder, measure, self.fingerprint, loggers, self.start)
+        return training.run(), spec.network_spec.features
+
+    def _warn(self, curve: Sequence[dict[str, float]]) -> None:
+        """Warn where the kept network is no better on validation than the untrained one."""
+        best, untrained = best_of(curve), curve[0]
+        if best[MONITOR] > untrained[MONITOR]:
+            return
+        log(
+            f"warning: {self.folder}: no network was better on validation than the untrained one "
+            f"({MONITOR} {untrained[MONITOR]:.3f}); the one after {best['steps']:.0f} steps is "
+            f"kept ({best[MONITOR]:.3f}); give more algorithm.total_steps, more "
+            "algorithm.validation_starts, or a split with more validation apartments"
+        )
 
     def load(self) -> ActorCritic:
         """Return the trained network, set to evaluation.
@@ -164,9 +186,9 @@ class Policy(Trained):
             Where a checkpoint belongs to another config, or has changed since it was trained.
         """
         from avn.rl.networks import ActorCritic
-        from avn.rl.training import BEST, load_network
+        from avn.rl.checkpoints import BEST, load_network
 
-        network = ActorCritic(_network_spec(self.cfg, self._feature_sizes()))
+        network = ActorCritic(network_spec(self.cfg, self._feature_sizes()))
         load_network(network, self.folder / BEST, self.fingerprint)
         self.check_weights()
         return network.eval()
@@ -180,128 +202,3 @@ class Policy(Trained):
         # the sum over features is one of floating-point numbers: their order is that of training
         order = [name for name in observation_names(self.cfg) if name in sizes]
         return {name: int(sizes[name]) for name in order}
-
-
-def _network_spec(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
-    from avn.rl.networks import NetworkSpec
-
-    protocol: Protocol = build_object("protocol", cfg.protocol)
-    return NetworkSpec(
-        features=features,
-        actions=protocol.actions,
-        width=cfg.baseline.width,
-        memory=cfg.baseline.memory,
-        map_channels=has_occupancy_model(cfg) * (2 if cfg.baseline.memory else 1),
-        map_width=cfg.baseline.map_width,
-    )
-
-
-def _train(policy: Policy) -> None:
-    """Train a policy and write its metrics."""
-    from avn.rl.networks import ActorCritic
-    from avn.rl.training import MONITOR, Training, best_of
-    from avn.rl.worker import TrainingSpec
-
-    started = time.perf_counter()
-    cfg, recipe = policy.cfg, build_algorithm(policy.cfg)
-    opened = {subset: load_subset(cfg, subset) for subset in SUBSETS}
-    tables = tables_of(cfg, opened["train"])
-    features = feature_sizes(cfg, tables)
-    network_spec = _network_spec(cfg, features)
-    torch.manual_seed(recipe.train_seed)
-    network = ActorCritic(network_spec)
-    for name in features:
-        table = tables.visual.get(name, tables.audio.get(name))
-        assert table is not None
-        network.standardise(name, table[:: max(1, len(table) // _EXAMPLES)])
-    protocol: Protocol = build_object("protocol", cfg.protocol)
-    spec = TrainingSpec(
-        tables=tables,
-        protocol=protocol,
-        network_spec=network_spec,
-        recipe=recipe,
-        buffers=dict(network.named_buffers()),
-        map_size=cfg.mapper.size,
-        trajectories=_trajectories(cfg, opened["train"][0], tables),
-        top=cfg.baseline.top,
-    )
-    measure = Measure(cfg, opened, protocol)
-    curve = Training(
-        spec, network, policy.folder, measure, policy.fingerprint, policy.run_name
-    ).run()
-    best = best_of(curve)
-    if best[MONITOR] <= curve[0][MONITOR]:
-        log(
-            f"warning: {policy.folder}: no network was better on validation than the untrained one "
-            f"({MONITOR} {curve[0][MONITOR]:.3f}); the one after {best['steps']:.0f} steps is kept "
-            f"({best[MONITOR]:.3f}); give more algorithm.total_steps, more "
-            "algorithm.validation_starts, or a split with more validation apartments"
-        )
-    metrics: dict[str, Any] = {f"best/{name}": value for name, value in best.items()}
-    metrics |= {f"untrained/{name}": value for name, value in curve[0].items()}
-    metrics |= {"features": features, "steps": curve[-1]["steps"]}
-    metrics |= {"seconds": time.perf_counter() - started}
-    policy.finish(
-        metrics, {name: plain(cfg, name) for name in ("baseline", "algorithm", "protocol")}
-    )
-
-
-def _trajectories(cfg: DictConfig, scenes: Sequence[Scene], tables: SceneBatch) -> Tensor | None:
-    from avn.rl.exploration_memory import draw_trajectories
-
-    if not cfg.baseline.memory:
-        return None
-    steps = cfg.protocol.exploration_steps
-    return draw_trajectories(
-        [*scenes], tables, cfg.algorithm.exploration_walks, steps, cfg.algorithm.train_seed
-    )
-
-
-def _returns(records: pd.DataFrame, reward: RewardConfig) -> pd.Series:
-    """Return each episode's undiscounted return under the training reward."""
-    success, collisions = records["success"], records["collisions"]
-    others = records["actions"] - success - collisions
-    return success * reward.success + collisions * reward.collision + others * reward.step
-
-
-class Measure:
-    """Evaluation of a network on training and validation apartments, under the protocol.
-
-    Parameters
-    ----------
-    cfg : DictConfig
-        Config of a command.
-    observed : dict of str to tuple
-        Scenes and their observations by subset, as `load_subset` gives them.
-    protocol : Protocol
-        Protocol of the episodes.
-    """
-
-    def __init__(self, cfg: DictConfig, observed: dict[str, Any], protocol: Protocol) -> None:
-        self._cfg, self._observed = cfg, observed
-        self._protocol = dataclasses.replace(protocol, num_starts=cfg.algorithm.validation_starts)
-        acoustics = OmegaConf.select(cfg, TRAINING.acoustics).name
-        self._labels = Labels(agent=cfg.agent.name, acoustics=acoustics)
-
-    def __call__(self, network: ActorCritic) -> dict[str, float]:
-        """Evaluate a network: mean return, success rate and SPL, such as `validation/spl`."""
-        metrics = {}
-        agent = actor_critic(self._cfg, network)
-        agent.samples = True  # the best network does not depend on how it acts later
-        for subset, (scenes, observations) in self._observed.items():
-            records = pd.concat(
-                rollout_scene(
-                    agent, scene, self._episodes(scene), self._protocol, self._labels, observed
-                )
-                for scene, observed in zip(scenes, observations, strict=True)
-            )
-            metrics[f"{subset}/return"] = float(
-                _returns(records, self._cfg.algorithm.reward).mean()
-            )
-            metrics[f"{subset}/success"] = float(records["success"].mean())
-            metrics[f"{subset}/spl"] = float(records["spl"].mean())
-        return metrics
-
-    def _episodes(self, scene: Scene) -> Any:
-        sounds = list(sound_files(self._cfg, TRAINING))
-        return frozen_episodes(scene, sounds, self._protocol, MEASURED_SEED)

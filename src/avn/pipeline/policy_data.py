@@ -11,6 +11,7 @@ from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.dataset.scene import Scene
 from avn.navigation.observations import SceneObservations
+from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import SceneBatch, build_scene_batch
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.audio_inference import Clips
@@ -22,7 +23,8 @@ from avn.pipeline.sounds import sound_files
 from avn.pipeline.stage import Stage
 
 if TYPE_CHECKING:
-    from avn.rl.networks import ActorCritic
+    from avn.rl.algorithm import Algorithm
+    from avn.rl.networks import ActorCritic, NetworkSpec
 
 SUBSETS = ("train", "validation")
 
@@ -96,3 +98,26 @@ def tables_of(cfg: DictConfig, opened: tuple[list[Scene], list[SceneObservations
     scenes, observations = opened
     sounds = len(sound_files(cfg, TRAINING))
     return build_scene_batch(scenes, build_object("protocol", cfg.protocol), observations, sounds)
+
+
+def build_algorithm(cfg: DictConfig) -> Algorithm:
+    """Build the algorithm of a config; raise `UserError` where there is none, or it cannot work."""
+    if not cfg.algorithm._target_:
+        raise UserError("algorithm: 'none' trains nothing; choose a3c")
+    algorithm: Algorithm = build_object("algorithm", cfg.algorithm)
+    return algorithm
+
+
+def network_spec(cfg: DictConfig, features: dict[str, int]) -> NetworkSpec:
+    """Return the sizes of the network of a config, for features of some sizes."""
+    from avn.rl.networks import NetworkSpec
+
+    protocol: Protocol = build_object("protocol", cfg.protocol)
+    return NetworkSpec(
+        features=features,
+        actions=protocol.actions,
+        width=cfg.baseline.width,
+        memory=cfg.baseline.memory,
+        map_channels=has_occupancy_model(cfg) * (2 if cfg.baseline.memory else 1),
+        map_width=cfg.baseline.map_width,
+    )

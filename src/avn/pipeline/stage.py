@@ -139,9 +139,7 @@ class Stage(ABC):
 
     def inputs(self) -> list[Any]:
         """Return the values of the settings, and hashes of the classes from outside among them."""
-        settings = values(self.cfg, self.settings(), self.ignored())
-        sources = outside_sources(settings)
-        return [*settings, sources] if sources else settings
+        return with_sources(values(self.cfg, self.settings(), self.ignored()))
 
     def discard(self) -> None:
         """Delete the product, so that it is made anew."""
@@ -163,6 +161,12 @@ class Stage(ABC):
         """Return the leaf keys of the config that this stage reads, without its dependencies."""
         keys = (*MACHINE, *self.settings(), *self.consulted())
         return leaves(self.cfg, keys, self.ignored())
+
+
+def with_sources(settings: list[Any]) -> list[Any]:
+    """Return some settings, and the hashes of the classes from outside that they name, if any."""
+    sources = outside_sources(settings)
+    return [*settings, sources] if sources else settings
 
 
 def with_needs(stages: Iterable[Stage]) -> list[Stage]:

@@ -22,13 +22,10 @@ class TrainedOnClips(Fitted):
 
     Attributes
     ----------
-    node : str
-        Config node of the recipe.
     without : str
         Message for a config without such a network.
     """
 
-    node: ClassVar[str]
     without: ClassVar[str]
 
     def check(self) -> None:
@@ -63,9 +60,9 @@ class TrainedOnClips(Fitted):
         """Estimate the duration from the clips of an epoch, trained on and measured."""
         recipe, sounds = self.cfg[self.node], len(sound_files(self.cfg, TRAINING))
         clips = [4 * apartments.pairs * sounds for apartments in (self.train, self.validation)]
-        measured = sum(min(count, recipe.validation_clips) for count in clips)
-        trained = 4 * self.train.pairs * recipe.sounds_per_pair
-        return float(recipe.epochs * (trained + measured) / CLIPS_PER_SECOND)
+        measured = sum(self.in_epoch(min(count, recipe.validation_clips)) for count in clips)
+        trained = self.in_epoch(4 * self.train.pairs * recipe.sounds_per_pair)
+        return float(self.epochs * (trained + measured) / CLIPS_PER_SECOND)
 
     def clips(self) -> dict[str, Any]:
         """Return the common arguments of data modules of clips."""

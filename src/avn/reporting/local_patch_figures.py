@@ -8,9 +8,10 @@ import lightning as L
 import numpy as np
 import torch
 from lightning.pytorch.callbacks import Callback
-from lightning.pytorch.loggers import TensorBoardLogger
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
+from avn.modules.attachments import tensorboard_writer
 
 
 def local_patch_figure(
@@ -74,7 +75,7 @@ class LocalPatchFigures(Callback):
         """Log one figure."""
         epoch = trainer.current_epoch + 1
         due = epoch % self.every == 0 or epoch in (1, trainer.max_epochs)
-        if not due or not isinstance(trainer.logger, TensorBoardLogger):
+        if not due or (writer := tensorboard_writer(trainer)) is None:
             return
         views = trainer.datamodule.measured_views["validation"]  # type: ignore[attr-defined]
         chosen = torch.linspace(0, len(views) - 1, self.count).long().unique()
@@ -89,4 +90,4 @@ class LocalPatchFigures(Callback):
             estimate.numpy(),
             f"validation, epoch {epoch}",
         )
-        trainer.logger.experiment.add_figure("windows", figure, trainer.global_step)
+        writer.add_figure("windows", figure, trainer.global_step)

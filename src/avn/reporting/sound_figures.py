@@ -10,7 +10,6 @@ import lightning as L
 import numpy as np
 import torch
 from lightning.pytorch.callbacks import Callback
-from lightning.pytorch.loggers import TensorBoardLogger
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from tensorboard.compat.proto.summary_pb2 import Summary  # type: ignore[import-
 from torch import Tensor
 
 from avn.apartments.floor_plan import CELL, DOOR_WIDTH, WALL_THICKNESS, FloorPlan
+from avn.modules.attachments import tensorboard_writer
 
 # Colours of states with the source in sight (True) and out of sight (False).
 COLOURS = {True: "tab:blue", False: "tab:orange"}
@@ -164,10 +164,10 @@ class SoundFigures(Callback):
 
     def on_train_start(self, trainer: L.Trainer, pl_module: Any) -> None:
         """Log spectrograms and audio of every sound, in sight and out of sight."""
-        if trainer.current_epoch or not isinstance(trainer.logger, TensorBoardLogger):
+        writer = tensorboard_writer(trainer)
+        if trainer.current_epoch or writer is None:
             return
         clips = trainer.datamodule.measured_clips["validation"]  # type: ignore[attr-defined]
-        writer = trainer.logger.experiment
         for seen, sight in ((True, "in sight"), (False, "out of sight")):
             pairs = torch.nonzero(clips.in_sight == seen)[:1, 0]
             for index, sound in enumerate(clips.sounds.names if len(pairs) else ()):
@@ -180,13 +180,14 @@ class SoundFigures(Callback):
                 audio = Summary.Value(
                     tag=f"audio/{tag}", audio=stereo(batch["clips"][0], pl_module.spectrogram.rate)
                 )
+                assert writer.file_writer is not None
                 writer.file_writer.add_summary(Summary(value=[audio]), 0)
 
     def on_validation_epoch_end(self, trainer: L.Trainer, pl_module: Any) -> None:
         """Log estimated and true locations of the first source, one figure per sound."""
         epoch = trainer.current_epoch + 1
         due = epoch % self.every == 0 or epoch in (1, trainer.max_epochs)
-        if not due or not isinstance(trainer.logger, TensorBoardLogger):
+        if not due or (writer := tensorboard_writer(trainer)) is None:
             return
         data: Any = trainer.datamodule  # type: ignore[attr-defined]
         clips, scene = data.measured_clips["validation"], data.scenes["validation"][0]
@@ -207,5 +208,4 @@ class SoundFigures(Callback):
                 torch.cat([batch["in_sight"] for batch in batches]).numpy(),
                 f"{scene.name}, {sound}, epoch {epoch}",
             )
-            writer = trainer.logger.experiment
             writer.add_figure(f"locations/{sound}", figure, trainer.global_step)

@@ -8,12 +8,12 @@ import lightning as L
 import numpy as np
 import torch
 from lightning.pytorch.callbacks import Callback
-from lightning.pytorch.loggers import TensorBoardLogger
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import CELL, FloorPlan
+from avn.modules.attachments import tensorboard_writer
 from avn.reporting.sound_figures import draw_plan
 
 
@@ -131,14 +131,13 @@ class StopFigures(Callback):
         """Log a map for each sound, and the curves over all sounds."""
         epoch = trainer.current_epoch + 1
         due = epoch % self.every == 0 or epoch in (1, trainer.max_epochs)
-        if not due or not isinstance(trainer.logger, TensorBoardLogger):
+        if not due or (writer := tensorboard_writer(trainer)) is None:
             return
         data: Any = trainer.datamodule  # type: ignore[attr-defined]
         clips, scene = data.measured_clips["validation"], data.scenes["validation"][0]
         # The states of source 0 in the first apartment come first.
         states = torch.arange(4 * len(scene.grid.lattice))
         at_goal = clips.target[states].eq(0).numpy()
-        writer = trainer.logger.experiment
         found = []
         for index, sound in enumerate(clips.sounds.names):
             items = clips.item(states, torch.tensor(index), 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import time
 from collections.abc import Callable, Sequence
@@ -14,17 +13,24 @@ import torch
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
 from avn.core.progress import log, progress_bar
+from avn.rl.checkpoints import (
+    BEST,
+    CURVE,
+    LAST,
+    damaged,
+    read_checkpoint,
+    read_start,
+    save_network,
+)
+from avn.rl.curve import best_of
 from avn.rl.networks import ActorCritic
 from avn.rl.shared import SharedState, flatten_parameters
 from avn.rl.worker import TrainingSpec
 from avn.rl.worker_pool import start_pool
 
 if TYPE_CHECKING:
-    from torch.utils.tensorboard import SummaryWriter
+    from lightning.pytorch.loggers import Logger
 
-LAST, BEST, CURVE = "last.ckpt", "best.ckpt", "curve.json"
-# Validation metric that selects the best network.
-MONITOR = "validation/spl"
 Measure = Callable[[ActorCritic], dict[str, float]]
 
 
@@ -40,11 +46,14 @@ class Training:
     folder : Path
         Folder of checkpoints and TensorBoard events.
     measure : callable
-        Returns the validation metrics of a network by name, including `MONITOR`.
+        Returns the validation metrics of a network by name, including `avn.rl.curve.MONITOR`.
     fingerprint : str
         Hash of all settings and data of the training, stored in checkpoints.
-    run_name : str
-        Folder of the TensorBoard events below `folder`, which names the run in TensorBoard.
+    loggers : callable, optional
+        Returns the loggers of the training, given its first step.
+    start : Path, optional
+        Last checkpoint of another training, from which this one goes on: weights, moments, number
+        of actions.
 
     Attributes
     ----------
@@ -54,7 +63,7 @@ class Training:
     Raises
     ------
     UserError
-        If the last checkpoint is damaged or belongs to another training.
+        If the last checkpoint is damaged or belongs to another training, or `start` does not fit.
     """
 
     def __init__(
@@ -64,18 +73,23 @@ class Training:
         folder: Path,
         measure: Measure,
         fingerprint: str,
-        run_name: str = "",
+        loggers: Callable[[int], Sequence[Logger]] = lambda step: (),
+        start: Path | None = None,
     ) -> None:
-        self.run_name = run_name
+        self._open_loggers = loggers
         self.spec, self.network, self.folder = spec, network, folder
         self.measure, self.fingerprint = measure, fingerprint
         self._weights, _ = flatten_parameters(network)
         self.shared = SharedState.of(self._weights)
         self.curve: list[dict[str, float]] = []
         self._states: list[dict[str, Any]] = []
+        # batches of the training from which this one goes on
+        self._before = 0
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / LAST).is_file():
             self._resume()
+        elif start is not None:
+            self._go_on_from(start)
 
     def run(self, rounds: int | None = None) -> list[dict[str, float]]:
         """Train to the end, or for a number of rounds.
@@ -95,24 +109,30 @@ class Training:
         UserError
             If a worker dies.
         """
-        from torch.utils.tensorboard import SummaryWriter
-
         recipe = self.spec.recipe
         updates = max(1, recipe.total_steps // (recipe.batch * recipe.workers))
-        planned = max(1, round(recipe.total_steps / recipe.validate_every))
+        updates -= self._before // recipe.workers
+        planned = max(1, round(updates * recipe.batch * recipe.workers / recipe.validate_every))
         each = -(-updates // min(planned, updates))
         last = -(-updates // each)
         if rounds is not None:
             last = min(last, len(self._rounds()) + rounds)
         bar = progress_bar(
-            f"training of {self.folder.name}", updates * recipe.workers, "batches", self._batches
+            f"training of {self.folder.name}",
+            self._before + updates * recipe.workers,
+            "batches",
+            self._batches,
         )
-        events = SummaryWriter(str(self.folder / self.run_name), purge_step=self.steps + 1)
-        with events as writer, bar as advance:
-            if not self.curve:
-                self._end_round({}, writer)
-            if len(self._rounds()) < last:
-                self._go(last, each, updates, writer, advance)
+        loggers = self._open_loggers(self.steps + 1)
+        try:
+            with bar as advance:
+                if not self.curve:
+                    self._end_round({}, loggers)
+                if len(self._rounds()) < last:
+                    self._go(last, each, updates, loggers, advance)
+        finally:
+            for logger in loggers:
+                logger.finalize("success" if len(self._rounds()) >= last else "failed")
         return self.curve
 
     @property
@@ -133,7 +153,7 @@ class Training:
         last: int,
         each: int,
         updates: int,
-        writer: SummaryWriter,
+        loggers: Sequence[Logger],
         advance: Callable[[int], None],
     ) -> None:
         shown = self._batches
@@ -154,22 +174,25 @@ class Training:
                 self._states = [state for _, state in reports]
                 metrics = _mean([found for found, _ in reports])
                 metrics["steps_per_second"] = (self.steps - before) / seconds
-                self._end_round(metrics, writer)
+                self._end_round(metrics, loggers)
         finally:
             pool.close()
 
-    def _end_round(self, metrics: dict[str, float], writer: SummaryWriter) -> None:
+    def _end_round(self, metrics: dict[str, float], loggers: Sequence[Logger]) -> None:
         """Validate, save the best network, log, and write the checkpoint."""
         self._weights.copy_(self.shared.weights)
         found = {"steps": float(self.steps), **metrics, **self.measure(self.network)}
         self.curve.append(found)
         if best_of(self.curve) is found:
             self._write(BEST, save_network(self.network, self.fingerprint))
-        for name, value in found.items():
-            if name != "steps":
-                group = name if "/" in name else f"steps/{name}"
-                writer.add_scalar(group, value, self.steps)
-        writer.flush()
+        curves = {
+            name if "/" in name else f"steps/{name}": value
+            for name, value in found.items()
+            if name != "steps"
+        }
+        for logger in loggers:
+            logger.log_metrics(curves, self.steps)
+            logger.save()
         shared = {key: getattr(self.shared, key).clone() for key in ("weights", "moments")}
         self._write(
             LAST,
@@ -179,6 +202,7 @@ class Training:
                 "updates": int(self.shared.updates),
                 "workers": self._states,
                 "curve": self.curve,
+                "before": self._before,
             },
         )
         with atomic_write(self.folder / CURVE) as part:
@@ -198,80 +222,23 @@ class Training:
             self.shared.updates.fill_(kept["updates"])
             self._weights.copy_(kept["weights"])
             self._states, self.curve = kept["workers"], kept["curve"]
+            self._before = kept.get("before", 0)
         except (KeyError, RuntimeError) as error:
-            raise _damaged(path) from error
+            raise damaged(path) from error
         log(f"{path}: going on after {self.steps} steps")
 
-
-def best_of(curve: Sequence[dict[str, float]]) -> dict[str, float]:
-    """Return the entry of a curve whose network is kept.
-
-    It is the best on validation of the networks that were trained, the latest of equal ones. The
-    untrained network, the first entry, is the best only while it is alone: small validation
-    apartments may rate it higher by chance.
-    """
-    return max(reversed(curve[1:] or curve), key=lambda point: point[MONITOR])
-
-
-def save_network(network: ActorCritic, fingerprint: str) -> dict[str, Any]:
-    """Return the content of a checkpoint of a network alone."""
-    weights = {name: value.clone() for name, value in network.state_dict().items()}
-    network_spec = dataclasses.asdict(network.spec)
-    return {"fingerprint": fingerprint, "network_spec": network_spec, "network": weights}
-
-
-def load_network(network: ActorCritic, path: Path, fingerprint: str) -> None:
-    """Load the weights of a checkpoint into a network.
-
-    Parameters
-    ----------
-    network : ActorCritic
-        Changed in place.
-    path : Path
-        Checkpoint of `save_network`.
-    fingerprint : str
-        Expected fingerprint of the checkpoint.
-
-    Raises
-    ------
-    UserError
-        If the checkpoint is missing, damaged or of another training.
-    """
-    kept = read_checkpoint(path, fingerprint)
-    try:
-        if kept["network_spec"] != dataclasses.asdict(network.spec):
+    def _go_on_from(self, path: Path) -> None:
+        kept = read_start(path, self.spec.recipe)
+        sizes = {name: getattr(self.shared, name).shape for name in ("weights", "moments")}
+        if any(kept[name].shape != size for name, size in sizes.items()):
             raise UserError(
-                f"{path}: features or sizes are {kept['network_spec']}, and the config's are "
-                f"{dataclasses.asdict(network.spec)}; delete {path.parent} to train again"
+                f"ckpt_path: {path} is of another network, with {len(kept['weights'])} "
+                f"weights, and this one has {len(self.shared.weights)}"
             )
-        network.load_state_dict(kept["network"])
-    except (KeyError, RuntimeError, TypeError) as error:
-        raise _damaged(path) from error
-
-
-def read_checkpoint(path: Path, fingerprint: str) -> dict[str, Any]:
-    """Read the content of a checkpoint.
-
-    Raises
-    ------
-    UserError
-        If it is missing, damaged or of another training.
-    """
-    try:
-        kept: dict[str, Any] = torch.load(path, weights_only=True)
-        found = kept["fingerprint"]
-    except Exception as error:
-        raise _damaged(path) from error
-    if found != fingerprint:
-        raise UserError(
-            f"{path}: the checkpoint is of another row or recipe ({str(found)[:8]}, not "
-            f"{fingerprint[:8]}); delete {path.parent} to train again"
-        )
-    return kept
-
-
-def _damaged(path: Path) -> UserError:
-    return UserError(f"{path}: damaged; delete {path.parent} to train again")
+        for name in sizes:
+            getattr(self.shared, name).copy_(kept[name])
+        self.shared.updates.fill_(kept["updates"])
+        self._before = self._batches
 
 
 def _mean(metrics: list[dict[str, float]]) -> dict[str, float]:
