@@ -212,6 +212,31 @@ def test_level_falls_with_the_way_to_walk() -> None:
     assert rooms[0] > rooms[1] + 3 > rooms[2] + 6
 
 
+def test_direct_to_reverberant_ratio_out_of_sight_depends_on_the_regime() -> None:
+    """At equal distances, out of sight against in sight, as `docs/acoustics.md` says.
+
+    Through walls the direct sound keeps its strength, and reverberation does not.
+    """
+    plan = three_rooms()
+    grid = build_grid(plan)
+    receivers = np.column_stack([grid.centres, np.full(len(grid.centres), 1.5)])
+    source = np.array([1.0, 4.0, 1.0])
+    away = np.linalg.norm(receivers - source, axis=1)
+    receivers = receivers[(away > 2.2) & (away < 3.8)]
+    bent = find_paths("diffraction", walls(plan), source, receivers).bent
+    assert min(bent.sum(), (~bent).sum()) >= 10
+    config = AcousticsConfig(rays=1000, seconds=0.4)
+    reverberation = render_source(build_surfaces(plan), source, receivers, config)
+    tail = (reverberation.samples * reverberation.scale[:, None, None, None]) ** 2
+    differences = []
+    for own in (RESONANCE, DIFFRACTION):
+        direct = responses(render_direct_paths(walls(plan), source, receivers, own)) ** 2
+        ratio = 10 * np.log10(direct.sum(axis=(1, 2, 3)) / tail.sum(axis=(1, 2, 3)))
+        differences.append(np.median(ratio[bent]) - np.median(ratio[~bent]))
+    assert differences[0] > 1.0
+    assert differences[1] < -5.0
+
+
 def test_an_unknown_regime_is_named() -> None:
     with pytest.raises(UserError, match=r"acoustics.direct_path: 'teleport'.*diffraction"):
         find_paths("teleport", NO_WALLS, EAR[0], EAR)

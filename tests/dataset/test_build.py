@@ -89,6 +89,20 @@ def test_what_is_gathered_is_what_was_rendered(plan, made):
         np.testing.assert_allclose(found.numpy(), whole[cells, heading], atol=1e-7)
 
 
+def test_energies_are_those_of_both_parts_of_the_responses(plan, made):
+    brirs, grid = made[1].brirs, made[1].grid
+    direct, reverberation = brirs.energies()
+    receivers = np.column_stack([grid.centres, np.full(grid.cells, ROUND.receiver_height)])
+    for source, cell in enumerate(made[1].sources):
+        place = np.array([*grid.centres[cell], ROUND.source_height])
+        paths = brir.render_direct_paths(walls(plan), place, receivers, ROUND)
+        wanted = (paths.samples * paths.scale[:, None, None, None].astype(float)) ** 2
+        np.testing.assert_allclose(direct[source], wanted.sum(axis=(1, 2, 3)), rtol=1e-5)
+        tail = brir.render_source(build_surfaces(plan), place, receivers, ROUND)
+        wanted = (tail.samples * tail.scale[:, None, None, None].astype(float)) ** 2
+        np.testing.assert_allclose(reverberation[source], wanted.sum(axis=(1, 2, 3)), rtol=1e-5)
+
+
 def test_the_regimes_share_the_tail_and_differ_in_the_first_arrival(made):
     one, other = (scene.brirs for scene in made)
     hidden = np.argwhere(~made[0].in_sight)[0]

@@ -91,6 +91,25 @@ class Brirs:
         at = at.clamp(max=self.samples - 1)[:, None].expand_as(taps)
         return brirs.scatter_add_(2, at, taps * keep[:, None])
 
+    def energies(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Compute the energies of the direct sound and of the reverberation, (K, C) each.
+
+        They are summed over headings, ears and samples. The two parts are stored separately, so
+        no window has to divide a response; ten times the decimal logarithm of their ratio is the
+        direct-to-reverberant ratio. The energy of the direct sound is 0 where there is none.
+        """
+        return (
+            _energies(self._direct_path, self._direct_path_scale),
+            _energies(self._reverberation, self._reverberation_scale),
+        )
+
+
+def _energies(samples: NDArray[np.int16], scale: NDArray[np.float32]) -> NDArray[np.float64]:
+    squares = [
+        (own.astype(np.float32) ** 2).sum(axis=(1, 2, 3), dtype=np.float64) for own in samples
+    ]
+    return np.stack(squares) * scale.astype(np.float64) ** 2
+
 
 def _read(
     from_file: tuple[Path, str], kind: str, version: int, pairs: tuple[int, int], memory_map: bool
