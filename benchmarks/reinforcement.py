@@ -1,8 +1,11 @@
 """Environment and training steps a second, against Stable-Baselines3's A2C on the same world.
 
-The world is a hand-drawn flat with features of the real sizes. Ours trains with two workers, the
-peer with its best of one and two threads; both have the same network, N, steps a batch, rewards
-and optimiser. Then the return of both after the same steps, over three seeds.
+The world is a hand-drawn flat with features of the real sizes. The network of both is the one of
+this package, with the same first weights; rewards, steps a batch, N of a process, loss, optimiser
+and learning rate are the same. Both have two cores: ours trains with two workers that gather N
+episodes each and apply their gradients as they finish (`update_order=free`), the peer, which has no
+workers, with its best of one and two threads. So the ratio of their rates is that of two ways to
+use two cores. Then the return of both after the same steps, over three seeds.
 
     python benchmarks/reinforcement.py [steps of a training, default 200000]
 """
@@ -20,6 +23,7 @@ import numpy as np
 import torch
 from stable_baselines3 import A2C
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv
 
 from avn.apartments.local_patch import window_cells
@@ -55,7 +59,8 @@ cc##ccccC#ddddddd
 """
 WIDTH, N, STEPS = 128, 64, 20
 RECIPE = {
-    "entropy": 0.01,
+    "entropy_coef": 0.01,
+    "update_order": "free",
     "num_envs": N,
     "rollout_length": STEPS,
     "lr": 7e-4,
@@ -121,7 +126,7 @@ class Ours:
             curve = Training(spec, network, Path(folder), lambda _: measure, "b" * 64).run()
         rounds = curve[1:]
         self.rate = float(np.mean([own["steps_per_second"] for own in rounds[-2:]]))
-        self.earned = rounds[-1]["return"]
+        self.earned = rounds[-1].get("return", float("nan"))  # no episode may have ended
         self.steps = steps
 
 
@@ -185,6 +190,18 @@ class PeerEnv(VecEnv):
         return [False] * N
 
 
+class Trunk(BaseFeaturesExtractor):
+    """The trunk of this package's network as the features of Stable-Baselines3's policy."""
+
+    def __init__(self, space: gymnasium.spaces.Dict, network: ActorCritic) -> None:
+        super().__init__(space, WIDTH)
+        self.network = network
+
+    def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
+        """Return the output of the trunk, (N, WIDTH)."""
+        return self.network.embed(observations)
+
+
 class Returns(BaseCallback):
     """Callback that measures the mean return of late episodes and the rate of the second half."""
 
@@ -212,27 +229,37 @@ class Returns(BaseCallback):
         return float(np.mean([own for at, own in self.ended if at > end - last]))
 
 
-def peer(tables: SceneBatch, row: str, steps: int, seed: int, threads: int) -> tuple[float, float]:
+def peer(
+    spec: TrainingSpec, names: tuple[str, ...], steps: int, seed: int, threads: int
+) -> tuple[float, float]:
     """Measure steps per second and final return of Stable-Baselines3's A2C."""
     torch.set_num_threads(threads)
-    env = PeerEnv(tables, ROWS[row], seed, 200)
-    sizes = {
-        "net_arch": [WIDTH, WIDTH],
-        "activation_fn": torch.nn.ReLU,
-        "share_features_extractor": True,
-    }
+    torch.manual_seed(seed)
+    network = ActorCritic(spec.network_spec)
+    network.load_state_dict(spec.buffers, strict=False)
+    recipe = spec.recipe
     model = A2C(
         "MultiInputPolicy",
-        env,
-        n_steps=STEPS,
-        learning_rate=7e-4,
-        rms_prop_eps=1e-5,
-        ent_coef=0.01,
-        max_grad_norm=40.0,
-        policy_kwargs=sizes,
+        PeerEnv(spec.tables, names, seed, recipe.max_steps),
+        n_steps=recipe.rollout_length,
+        learning_rate=recipe.lr,
+        gamma=recipe.gamma,
+        gae_lambda=recipe.gae_lambda,
+        rms_prop_eps=recipe.eps,
+        ent_coef=recipe.entropy_coef,
+        vf_coef=recipe.value_coef,
+        max_grad_norm=recipe.max_grad_norm,
+        policy_kwargs={
+            "net_arch": [],  # the heads are linear layers of the features
+            "features_extractor_class": Trunk,
+            "features_extractor_kwargs": {"network": network},
+            "ortho_init": False,
+        },
         seed=seed,
         device="cpu",
     )
+    for head, own in ((model.policy.action_net, "actor"), (model.policy.value_net, "critic")):
+        head.load_state_dict(getattr(network, own).state_dict())
     watch = Returns(steps)
     model.learn(steps, callback=watch)
     torch.set_num_threads(1)
@@ -271,14 +298,18 @@ def main() -> None:
     ours, peers = [], []
     for seed in range(3):
         options = {"total_steps": steps, "validate_every": each, "train_seed": seed}
-        ours.append(Ours(spec_of("a3c_va", scenes, tables, **options), steps))
-        peers += [(threads, *peer(tables, "a3c_va", steps, seed, threads)) for threads in (1, 2)]
+        spec = spec_of("a3c_va", scenes, tables, **options)
+        ours.append(Ours(spec, steps))
+        peers += [
+            (threads, *peer(spec, ROWS["a3c_va"], steps, seed, threads)) for threads in (1, 2)
+        ]
     fastest = max(rate for _, rate, _ in peers)
     rate = max(own.rate for own in ours)
     print(
-        f"Stable-Baselines3 A2C, the same network, N={N}, best of 1 and 2 threads: {fastest:,.0f}"
+        f"Stable-Baselines3 A2C, the same network, N={N}, best of 1 and 2 threads: "
+        f"{fastest:,.0f} steps/s"
     )
-    print(f"ours against it: {rate / fastest:.2f} times as fast")
+    print(f"ours with two workers, N={N} each: {rate:,.0f} steps/s, {rate / fastest:.2f} times")
     earned = [own.earned for own in ours], [value for _, _, value in peers]
     for name, values in zip(("ours", "Stable-Baselines3"), earned, strict=True):
         print(

@@ -2,6 +2,8 @@
 
 Each command runs in a process of its own, in turn with ``python -c "import torch"``: help, a
 misspelt option, a setting that is not read, the table of a finished run, and a finished training.
+`import torch` does other work: it is the unit of the ratios, since a command that imports torch
+cannot be faster, and no competitor.
 The figures are the least of the repetitions: processor seconds, wall-clock seconds and peak memory.
 
 Run from the repository: ``python benchmarks/startup.py``.

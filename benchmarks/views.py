@@ -2,9 +2,11 @@
 
 Peers, each used where it is installed: pybullet's TinyRenderer, a rasteriser on one thread that
 draws the same triangles in plain colours with shadows of one lamp, and Blender's Cycles, which
-follows the light of the same scene (`renderer=cycles`). The apartment is the first of the training
-apartments of `var`. Ours counts the baking of light once an apartment, spread over its views. All
-run on one thread of this process and report its processor time.
+follows the light of the same scene (`renderer=cycles`). The cameras and the size are the same, and
+the pictures are not: pybullet's have no textures, no indirect light and one sample a pixel, and
+Cycles' have the noise of few samples removed. So a ratio says what another kind of picture costs.
+The apartment is the first of the training apartments of `var`. Ours counts the baking of light once
+an apartment, spread over its views. All run in this process and report its processor time.
 
 Run from the repository: ``python benchmarks/views.py``.
 """
@@ -102,13 +104,19 @@ def main():
     states = np.linspace(0, 4 * grid.cells - 1, arguments.views).astype(int)
     centres, headings = grid.centres[states // 4], states % 4
     ours = run_raycast(plan, centres, headings, 4 * grid.cells)
-    peers = {"pybullet": ("pybullet", run_pybullet), "Cycles": ("bpy", run_cycles)}
-    for name, (module, run) in peers.items():
+    peers = {
+        "pybullet": ("pybullet", run_pybullet, "plain colours, one lamp"),
+        "Cycles": ("bpy", run_cycles, "the light of each view is followed"),
+    }
+    for name, (module, run, picture) in peers.items():
         if importlib.util.find_spec(module) is None:
             print(f"{name}: {module} is not installed")
             continue
         theirs = run(plan, centres, headings)
-        print(f"{name}: {theirs * 1000:.0f} ms a view, {theirs / ours:.1f} times ours")
+        print(
+            f"{name}: {theirs * 1000:.0f} ms a view, {theirs / ours:.1f} times ours, for another "
+            f"picture: {picture}"
+        )
 
 
 if __name__ == "__main__":

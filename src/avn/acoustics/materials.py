@@ -22,6 +22,7 @@ upper end of [Z] for plain walls (0.1).
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,63 +35,102 @@ SPEED_OF_SOUND = 343.0  # m/s, at 20 degrees
 
 _MID_FREQUENCY = 707.0  # Hz, of the coefficients of [Z]
 
-# A material that no table lists has the row of the most similar one, which the comment names.
-_ABSORPTION: dict[str, tuple[float, ...]] = {
-    "parquet": (0.15, 0.11, 0.10, 0.07, 0.06, 0.07),  # [E] wood floor on joists
-    "carpet": (0.08, 0.24, 0.57, 0.69, 0.71, 0.73),  # [E] heavy carpet on foam
-    "floor_tiles": (0.01, 0.01, 0.01, 0.02, 0.02, 0.02),  # [V] ceramic tiles, smooth
-    "plaster": (0.15, 0.10, 0.06, 0.04, 0.04, 0.05),  # [V] plasterboard on frame, painted
-    "painted_brick": (0.01, 0.01, 0.02, 0.02, 0.02, 0.03),  # [E] brick, unglazed, painted
-    "wall_tiles": (0.01, 0.01, 0.01, 0.02, 0.02, 0.02),  # [V] ceramic tiles, smooth
-    "ceiling_plaster": (0.20, 0.15, 0.10, 0.08, 0.04, 0.02),  # [V] plasterboard ceiling
-    "glass": (0.10, 0.05, 0.04, 0.03, 0.03, 0.03),  # [V] glass window
-    "wood": (0.27, 0.25, 0.25, 0.25, 0.25, 0.25),  # [N], thin panels
-    "upholstery": (0.44, 0.60, 0.77, 0.89, 0.82, 0.70),  # [V] seats upholstered in cloth
-    "mattress": (0.70, 0.76, 0.81, 0.84, 0.84, 0.81),  # [V] heavily upholstered seats
-    "laminate": (0.25, 0.25, 0.25, 0.25, 0.25, 0.25),  # [N]
-    "ceramic": (0.25, 0.25, 0.25, 0.25, 0.25, 0.25),  # [N]
-    "metal": (0.25, 0.25, 0.25, 0.25, 0.25, 0.25),  # [N]
-    "books": (0.36, 0.44, 0.31, 0.29, 0.39, 0.25),  # [E] coarse block: hard, porous, broken up
-    "fabric": (0.07, 0.31, 0.49, 0.75, 0.70, 0.60),  # [C] medium velour draped to half area
-}
 
-_ROUGHNESS: dict[str, float | tuple[float, ...]] = {
-    "parquet": 0.05,  # [Z] smooth surfaces 0.02-0.05
-    "carpet": 0.10,
-    "floor_tiles": 0.05,
-    "plaster": 0.10,  # [Z] plain walls with small things on them
-    "painted_brick": 0.10,  # [Z] brickwork, filled joints 0.05-0.1
-    "wall_tiles": 0.10,
-    "ceiling_plaster": 0.05,
-    "glass": 0.05,
-    "wood": (0.20, 0.30, 0.40, 0.50, 0.50, 0.60),  # [V] tables of a classroom
-    "upholstery": (0.30, 0.50, 0.60, 0.60, 0.70, 0.70),  # [V] theatre seats
-    "mattress": 0.30,
-    "laminate": 0.30,
-    "ceramic": 0.30,
-    "metal": 0.30,
-    "books": 0.30,  # [Z] shelf with books
-    "fabric": 0.30,
-}
+@dataclass(frozen=True)
+class Material:
+    """Coefficients of a material and where they come from.
+
+    Attributes
+    ----------
+    absorption : tuple of 6 float
+        Random-incidence absorption coefficient in each of `BANDS`.
+    roughness : float or tuple of 6 float
+        Scattering coefficient at mid frequency, or in each band.
+    absorption_source, scattering_source : str
+        Reference in brackets, see above, and the row of its table. A material that no table lists
+        has the row of the most similar one.
+    estimated : bool
+        True where the absorption is an estimate for furniture of this material, from its volume
+        and faces, and not a measured coefficient.
+    """
+
+    absorption: tuple[float, ...]
+    roughness: float | tuple[float, ...]
+    absorption_source: str
+    scattering_source: str
+    estimated: bool = False
+
+    @property
+    def scattering(self) -> tuple[float, ...]:
+        """Scattering coefficient in each band, at most 0.99."""
+        if isinstance(self.roughness, tuple):
+            return self.roughness
+        return tuple(min(0.99, self.roughness * (f / _MID_FREQUENCY) ** 0.5) for f in BANDS)
+
+
+_OBJECTS = "[N] hard objects"
+_SMOOTH = "[Z] smooth surfaces, 0.02 to 0.05"
+_PLAIN = "[Z] plain walls with small things on them"
+_PIECES = "[Z] shelf with books, as the most similar"
+
+TABLE: dict[str, Material] = {
+    "parquet": Material(
+        (0.15, 0.11, 0.10, 0.07, 0.06, 0.07), 0.05, "[E] wood floor on joists", _SMOOTH
+    ),
+    "carpet": Material(
+        (0.08, 0.24, 0.57, 0.69, 0.71, 0.73), 0.10, "[E] heavy carpet on foam", "[Z], an estimate"
+    ),
+    "floor_tiles": Material(
+        (0.01, 0.01, 0.01, 0.02, 0.02, 0.02), 0.05, "[V] ceramic tiles, smooth", _SMOOTH
+    ),
+    "plaster": Material(
+        (0.15, 0.10, 0.06, 0.04, 0.04, 0.05), 0.10, "[V] plasterboard on frame, painted", _PLAIN
+    ),
+    "painted_brick": Material(
+        (0.01, 0.01, 0.02, 0.02, 0.02, 0.03), 0.10, "[E] brick, unglazed, painted",
+        "[Z] brickwork, filled joints, 0.05 to 0.1",
+    ),
+    "wall_tiles": Material(
+        (0.01, 0.01, 0.01, 0.02, 0.02, 0.02), 0.10, "[V] ceramic tiles, smooth", _PLAIN
+    ),
+    "ceiling_plaster": Material(
+        (0.20, 0.15, 0.10, 0.08, 0.04, 0.02), 0.05, "[V] plasterboard ceiling", _SMOOTH
+    ),
+    "glass": Material(
+        (0.10, 0.05, 0.04, 0.03, 0.03, 0.03), 0.05, "[V] glass window", _SMOOTH
+    ),
+    "wood": Material(
+        (0.27, 0.25, 0.25, 0.25, 0.25, 0.25), (0.20, 0.30, 0.40, 0.50, 0.50, 0.60),
+        "[N] hard objects, thin panels", "[V] tables of a classroom", estimated=True,
+    ),
+    "upholstery": Material(
+        (0.44, 0.60, 0.77, 0.89, 0.82, 0.70), (0.30, 0.50, 0.60, 0.60, 0.70, 0.70),
+        "[V] seats upholstered in cloth", "[V] theatre seats",
+    ),
+    "mattress": Material(
+        (0.70, 0.76, 0.81, 0.84, 0.84, 0.81), 0.30, "[V] heavily upholstered seats", _PIECES
+    ),
+    "laminate": Material((0.25,) * 6, 0.30, _OBJECTS, _PIECES, estimated=True),
+    "ceramic": Material((0.25,) * 6, 0.30, _OBJECTS, _PIECES, estimated=True),
+    "metal": Material((0.25,) * 6, 0.30, _OBJECTS, _PIECES, estimated=True),
+    "books": Material(
+        (0.36, 0.44, 0.31, 0.29, 0.39, 0.25), 0.30,
+        "[E] coarse concrete block: hard, porous, broken up", "[Z] shelf with books",
+    ),
+    "fabric": Material(
+        (0.07, 0.31, 0.49, 0.75, 0.70, 0.60), 0.30, "[C] medium velour draped to half area", _PIECES
+    ),
+}  # fmt: skip
 
 NAMES = MATERIALS
 
 
-def _spread(roughness: float | tuple[float, ...]) -> tuple[float, ...]:
-    if isinstance(roughness, tuple):
-        return roughness
-    return tuple(min(0.99, roughness * (band / _MID_FREQUENCY) ** 0.5) for band in BANDS)
-
-
-_SCATTERING = {name: _spread(roughness) for name, roughness in _ROUGHNESS.items()}
-
-
-def _rows(table: dict[str, tuple[float, ...]], names: Iterable[str]) -> NDArray[np.float64]:
+def _rows(names: Iterable[str], kind: str) -> NDArray[np.float64]:
     rows = []
     for name in names:
-        if name not in table:
+        if name not in TABLE:
             raise UserError(f"material '{name}' is not known; use one of {', '.join(NAMES)}")
-        rows.append(table[name])
+        rows.append(getattr(TABLE[name], kind))
     return np.array(rows, dtype=np.float64).reshape(-1, len(BANDS))
 
 
@@ -112,7 +152,7 @@ def absorption(names: Iterable[str]) -> NDArray[np.float64]:
     UserError
         If a name is unknown.
     """
-    return _rows(_ABSORPTION, names)
+    return _rows(names, "absorption")
 
 
 def scattering(names: Iterable[str]) -> NDArray[np.float64]:
@@ -121,7 +161,7 @@ def scattering(names: Iterable[str]) -> NDArray[np.float64]:
     The coefficient is the share of the reflected energy that is not reflected specularly.
     Parameters and errors are those of `absorption`.
     """
-    return _rows(_SCATTERING, names)
+    return _rows(names, "scattering")
 
 
 def air_attenuation(
