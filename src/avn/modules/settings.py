@@ -67,7 +67,7 @@ class TrainerConfig:
     devices : int or list of int
         1, or the index of one device in brackets, such as [1]. A network is trained on one device.
     precision : str
-        Lightning's name of the number format: 32-true, bf16-mixed, 16-mixed (GPU), 64-true.
+        Number format of the arithmetic: 32-true, bf16-mixed, or 16-mixed on a GPU.
     max_epochs : int, optional
         Maximum number of epochs, 1 or more; by default the `epochs` of each network's recipe.
     gradient_clip_val : float, optional

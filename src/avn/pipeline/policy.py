@@ -185,8 +185,8 @@ class Policy(Trained):
         UserError
             Where a checkpoint belongs to another config, or has changed since it was trained.
         """
-        from avn.rl.networks import ActorCritic
         from avn.rl.checkpoints import BEST, load_network
+        from avn.rl.networks import ActorCritic
 
         network = ActorCritic(network_spec(self.cfg, self._feature_sizes()))
         load_network(network, self.folder / BEST, self.fingerprint)
