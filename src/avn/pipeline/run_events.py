@@ -40,7 +40,7 @@ def write_events(
     """
     means = results.headline(summary)
     metrics = {"success": means.pop("sr"), **means}
-    table = breakdown(episodes, "distance", draws=1)
+    table = breakdown(episodes, "distance", draws=0)
     steps = [DISTANCES[group] for group in _groups(table)]
     curves = {
         f"by_distance/{name}": dict(zip(steps, table[column].tolist(), strict=True))

@@ -105,8 +105,18 @@ def _matches(value: Any, allowed: Sequence[str]) -> bool:
         return False
 
 
+def read_config(folder: Path) -> dict[str, Any]:
+    """Return the config of a run as plain values; empty where it is missing or damaged."""
+    try:
+        text = (folder / _CONFIG).read_text(encoding="utf-8")
+        found = yaml.load(text, Loader=_LOADER)
+    except (OSError, ValueError, yaml.YAMLError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
 def _row(folder: Path) -> Row:
-    cfg = _read_yaml(folder / _CONFIG)
+    cfg = read_config(folder)
     row: Row = dict.fromkeys(COLUMNS, None) | _metrics(folder / _RESULTS)
     row |= {key: _name(cfg, key) for key in ("agent", "protocol", "acoustics", "split")}
     row |= {key: cfg.get(key) for key in ("subset", "episodes", "seed", "train_seed")}
@@ -119,14 +129,6 @@ def _row(folder: Path) -> Row:
 def _name(cfg: Mapping[str, Any], group: str) -> str | None:
     node = cfg.get(group)
     return str(node["name"]) if isinstance(node, dict) and "name" in node else None
-
-
-def _read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        found = yaml.load(path.read_text(encoding="utf-8"), Loader=_LOADER)
-    except (OSError, ValueError, yaml.YAMLError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _metrics(path: Path) -> Row:

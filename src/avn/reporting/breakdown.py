@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from avn.core.errors import UserError
-from avn.navigation.metrics import cluster_bootstrap
+from avn.reporting.bootstrap import DRAWS, estimate
+from avn.reporting.nesting import nested
 from avn.reporting.trajectory_figures import RUN_COLOURS, figure_of
 
 # Lower bounds of the groups of distances, metres.
@@ -27,7 +28,7 @@ TITLES = {
 }
 
 
-def breakdown(episodes: pd.DataFrame, kind: str, draws: int = 1000) -> pd.DataFrame:
+def breakdown(episodes: pd.DataFrame, kind: str, draws: int = DRAWS) -> pd.DataFrame:
     """Compute success rate and SPL by one property of the start.
 
     Parameters
@@ -37,14 +38,14 @@ def breakdown(episodes: pd.DataFrame, kind: str, draws: int = 1000) -> pd.DataFr
     kind : {"distance", "sight", "rooms"}
         Property by which episodes are grouped.
     draws : int
-        Bootstrap resamples over (scene, source) clusters.
+        Bootstrap resamples; 0 for no intervals.
 
     Returns
     -------
     DataFrame
-        `group`, a label; `episodes`, their number; `sr` and `spl`, 0 to 1, with 95 % confidence
-        intervals `sr_low`, `sr_high`, `spl_low`, `spl_high`, NaN with too few clusters. Empty
-        groups are left out.
+        `group`, a label; `episodes`, their number; `sr` and `spl`, 0 to 1, means over episodes,
+        with the 95 % intervals `sr_low`, `sr_high`, `spl_low`, `spl_high` of
+        `avn.reporting.bootstrap`, NaN with too few apartments. Empty groups are left out.
 
     Raises
     ------
@@ -55,14 +56,11 @@ def breakdown(episodes: pd.DataFrame, kind: str, draws: int = 1000) -> pd.DataFr
         raise UserError(f"breakdown: '{kind}' is none of {', '.join(KINDS)}")
     rows = []
     for name, part in episodes.groupby(_groups(episodes, kind), observed=True):
-        values = part[["success", "spl"]].to_numpy(dtype=np.float64)
-        clusters = part.groupby(["scene", "source"]).ngroup().to_numpy()
-        means = values.mean(axis=0)
-        low, high = cluster_bootstrap(values, clusters, draws=draws)
+        found = estimate(nested(part, ["success", "spl"]), equal=False, draws=draws)
         row: dict[str, object] = {"group": str(name), "episodes": len(part)}
         for index, metric in enumerate(("sr", "spl")):
-            row |= {metric: means[index], f"{metric}_low": low[index]}
-            row[f"{metric}_high"] = high[index]
+            row |= {metric: found.mean[index], f"{metric}_low": found.low[index]}
+            row[f"{metric}_high"] = found.high[index]
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -107,9 +105,10 @@ def breakdown_figure(
     -------
     Figure
         Points with 95 % intervals, for the groups that any run has, and the number of episodes
-        under each group.
+        under each group. The meaning of the intervals stands above the caption.
     """
-    figure = figure_of(12.5, 6.4 + 0.25 * len(runs), caption)
+    meaning = "Lines: 95 %, apartments, sources and episodes resampled."
+    figure = figure_of(12.5, 6.4 + 0.25 * len(runs), "\n".join(filter(None, (meaning, caption))))
     panels = figure.subplots(2, len(KINDS), sharey="row", width_ratios=(2.4, 1, 1.5))
     for column, kind in enumerate(KINDS):
         tables = [breakdown(own, kind).set_index("group") for own in runs.values()]
@@ -138,7 +137,7 @@ def _draw_groups(
     kind: str,
     colours: Sequence[str],
 ) -> None:
-    """Draw a metric of each run by group, with intervals where there are enough clusters.
+    """Draw a metric of each run by group, with intervals where there are enough apartments.
 
     Parameters
     ----------

@@ -24,23 +24,31 @@ _PERCEPTION = {
 
 
 def read_run(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Read results and episodes of a finished run.
+    """Read results and episodes of a finished run; see `read_episodes`."""
+    episodes = read_episodes(folder)
+    # the rule for intervals may have changed since the run
+    return results.summarise(episodes), episodes
+
+
+def read_episodes(folder: Path) -> pd.DataFrame:
+    """Read the episodes of a finished run.
 
     Raises
     ------
     UserError
         Where a file is missing or damaged, or the results do not match the episodes.
     """
+    ends = list(results.INTERVALS)
     try:
         runs = results.read_csv(folder / RESULTS)
         episodes = results.read_csv(folder / EPISODE_RECORDS)
-        summary = results.summarise(episodes)
-        # the rule for intervals may have changed since the run
-        ends = list(results.INTERVALS)
+        if episodes[list(results.METRICS.values())].isna().any(axis=None):
+            raise ValueError("a metric is missing")
+        summary = results.summarise(episodes, draws=0)
         pd.testing.assert_frame_equal(runs.drop(columns=ends), summary.drop(columns=ends))
-    except (OSError, ValueError, KeyError, AssertionError, UserError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AssertionError, UserError) as error:
         raise UserError(f"{folder}: the run is damaged; delete the folder and run again") from error
-    return summary, episodes
+    return episodes
 
 
 def show_run(folder: Path, caption: str, privileged: bool, paper: Sequence[str] = ()) -> None:

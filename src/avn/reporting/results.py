@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ import pandas as pd
 
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
-from avn.navigation.metrics import MIN_CLUSTERS, cluster_bootstrap
+from avn.reporting.bootstrap import DRAWS, MIN_GROUPS, estimate
+from avn.reporting.nesting import NETWORK, nested
 
 LABELS = ("agent", "protocol", "acoustics", "look")
 # Value of `look` of every agent that does not rotate to observe, not named in headings.
@@ -28,11 +30,17 @@ INTERVALS = tuple(f"{metric}_{end}" for metric in METRICS for end in ("low", "hi
 RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *METRICS, *INTERVALS)
 ALL_SOUNDS = "all"
 AVERAGE = "average"
-NO_INTERVAL = f"too few sources (fewer than {MIN_CLUSTERS}) for an interval"
-_PAIR = ["sound", "scene", "seed", "episode"]
+NO_INTERVAL = (
+    f"too few apartments, or of one apartment too few sources (fewer than {MIN_GROUPS}), for an "
+    "interval"
+)
+# Meaning of the intervals of a table.
+ONE_INTERVAL = "of one apartment alone, sources and episodes, of this apartment only"
+INTERVAL = f"95 %, apartments, sources and episodes resampled; {ONE_INTERVAL}"
+NETWORK_INTERVAL = f"95 %, networks, apartments, sources and episodes resampled; {ONE_INTERVAL}"
 
 
-def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
+def summarise(episodes: pd.DataFrame, draws: int = DRAWS) -> pd.DataFrame:
     """Compute the metrics by scene and sound, with confidence intervals.
 
     Parameters
@@ -41,14 +49,15 @@ def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
         Records of any number of agents, protocols, sounds, scenes and seeds; see
         `avn.agents.rollout.rollout_scene`.
     draws : int
-        Bootstrap resamples.
+        Bootstrap resamples; 0 for no intervals.
 
     Returns
     -------
     DataFrame
         Columns `RESULT_COLUMNS`. Scene `average` is the unweighted mean over scenes, as in the
         paper. Sound `all` pools the episodes of all sounds if there are several. Intervals are
-        95 % bootstrap intervals over (scene, source) clusters, NaN where there are too few.
+        95 % intervals of `avn.reporting.bootstrap`, NaN where there are too few apartments: those
+        of `average` are for new apartments, those of a scene for new sources in it.
 
     Raises
     ------
@@ -60,35 +69,28 @@ def summarise(episodes: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
     rows = []
     for keys, run in episodes.groupby([*LABELS, "seed"], sort=False):
         labels = dict(zip((*LABELS, "seed"), keys, strict=True))
-        sounds = [(str(sound), part) for sound, part in run.groupby("sound", sort=False)]
-        if len(sounds) > 1:
-            sounds.append((ALL_SOUNDS, run))
-        for sound, part in sounds:
-            scenes = [(str(scene), own) for scene, own in part.groupby("scene", sort=False)]
-            for scene, own in [*scenes, (AVERAGE, part)]:
-                row = {**labels, "sound": sound, "scene": scene, "episodes": len(own)}
-                rows.append(row | _metrics(own, draws))
+        for cell, part in _cells(run):
+            rows.append(labels | cell | {"episodes": len(part)} | _metrics(part, draws))
     return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
 
 
+def _cells(run: pd.DataFrame) -> Iterator[tuple[dict[str, str], pd.DataFrame]]:
+    """Yield sound, scene and episodes of each row, with all sounds and the average last."""
+    sounds = [(str(sound), part) for sound, part in run.groupby("sound", sort=False)]
+    if len(sounds) > 1:
+        sounds.append((ALL_SOUNDS, run))
+    for sound, part in sounds:
+        scenes = [(str(scene), own) for scene, own in part.groupby("scene", sort=False)]
+        for scene, own in [*scenes, (AVERAGE, part)]:
+            yield {"sound": sound, "scene": scene}, own
+
+
 def _metrics(episodes: pd.DataFrame, draws: int) -> dict[str, float]:
-    values = episodes[list(METRICS.values())].to_numpy(dtype=np.float64)
-    weights = _scene_weights(episodes)
-    means = weights @ values
-    low, high = cluster_bootstrap(values, _clusters(episodes), weights, draws)
-    metrics = dict(zip(METRICS, means.tolist(), strict=True))
-    ends = np.stack((low, high), axis=1).reshape(-1)
+    columns = list(METRICS.values())
+    found = estimate(nested(episodes, columns), draws=draws)
+    ends = np.stack((found.low, found.high), axis=1).reshape(-1)
+    metrics = dict(zip(METRICS, found.mean.tolist(), strict=True))
     return metrics | dict(zip(INTERVALS, ends.tolist(), strict=True))
-
-
-def _scene_weights(episodes: pd.DataFrame) -> np.ndarray:
-    """Compute weights of the episodes that sum to 1 and are equal in total for all scenes."""
-    sizes = episodes.groupby("scene")["scene"].transform("size").to_numpy(dtype=np.float64)
-    return 1.0 / (sizes * episodes["scene"].nunique())
-
-
-def _clusters(episodes: pd.DataFrame) -> np.ndarray:
-    return episodes.groupby(["scene", "source"]).ngroup().to_numpy()
 
 
 def headline(results: pd.DataFrame) -> dict[str, float]:
@@ -107,61 +109,51 @@ def headline(results: pd.DataFrame) -> dict[str, float]:
     return {metric: float(average.iloc[0][metric]) for metric in METRICS}
 
 
-def across_seeds(results: pd.DataFrame) -> pd.DataFrame:
-    """Compute mean and standard deviation of the metrics over seeds.
-
-    Returns
-    -------
-    DataFrame
-        One row per agent, protocol, acoustics, look, sound and scene: `seeds`, their number, and
-        for each metric its mean and `<metric>_std`, the sample standard deviation (NaN for one
-        seed).
-    """
-    groups = results.groupby([*LABELS, "sound", "scene"], sort=False)
-    table = groups["seed"].nunique().rename("seeds").to_frame()
-    for metric in METRICS:
-        table[metric] = groups[metric].mean()
-        table[f"{metric}_std"] = groups[metric].std(ddof=1)
-    return table.reset_index()
-
-
-def compare(one: pd.DataFrame, other: pd.DataFrame, draws: int = 2000) -> pd.DataFrame:
-    """Compute paired differences between two runs over the same episodes, `one` minus `other`.
+def across_runs(episodes: pd.DataFrame, draws: int = DRAWS) -> pd.DataFrame:
+    """Compute the metrics of each setting over all seeds and networks.
 
     Parameters
     ----------
-    one, other : DataFrame
-        Records of one run each.
+    episodes : DataFrame
+        Records of any number of runs. Those of several networks have a column `train_seed`, and
+        each network the same episodes.
     draws : int
-        Bootstrap resamples over (scene, source) clusters.
+        Bootstrap resamples; 0 for no intervals.
 
     Returns
     -------
     DataFrame
-        `metric`, `difference`, and its 95 % confidence interval `low`, `high`, NaN with too few
-        (scene, source) clusters. Scenes have equal weight.
+        One row per agent, protocol, acoustics, look, sound and scene: `seeds`, `networks` and
+        `episodes`, their numbers; each metric and its interval, as those of `summarise`, with the
+        networks resampled too if there are several; `<metric>_std`, the standard deviation between
+        seeds, and `<metric>_network_std`, that between networks, NaN for a single one.
 
     Raises
     ------
     UserError
-        If the runs have different episodes.
+        If the networks have different episodes.
     """
-    same = [*_PAIR, "source", "start_cell", "start_heading"]
-    first, second = (
-        run.sort_values(_PAIR, kind="stable").reset_index(drop=True) for run in (one, other)
-    )
-    if not first[same].equals(second[same]):
-        raise UserError(
-            "episodes.csv: the two runs did not walk the same episodes; run both with the same "
-            "split, protocol, sound and seed"
-        )
+    rows = []
+    for keys, run in episodes.groupby(list(LABELS), sort=False):
+        labels = dict(zip(LABELS, keys, strict=True))
+        for cell, part in _cells(run):
+            row = labels | cell | {"seeds": part["seed"].nunique(), "networks": 1}
+            row |= {"episodes": len(part)} | _metrics(part, draws) | _spread(part, "seed", "std")
+            row |= _spread(part, NETWORK, "network_std")
+            if NETWORK in part:
+                row["networks"] = part[NETWORK].nunique()
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _spread(episodes: pd.DataFrame, key: str, name: str) -> dict[str, float]:
+    """Compute the standard deviations of the metrics between the values of a column."""
     columns = list(METRICS.values())
-    values = (first[columns].to_numpy(np.float64)) - second[columns].to_numpy(np.float64)
-    weights = _scene_weights(first)
-    low, high = cluster_bootstrap(values, _clusters(first), weights, draws)
-    return pd.DataFrame(
-        {"metric": list(METRICS), "difference": weights @ values, "low": low, "high": high}
-    )
+    if key not in episodes:
+        return {f"{metric}_{name}": np.nan for metric in METRICS}
+    means = episodes.groupby([key, "scene"])[columns].mean().groupby(key).mean()
+    spread = means.std(ddof=1).tolist()
+    return {f"{metric}_{name}": own for metric, own in zip(METRICS, spread, strict=True)}
 
 
 def shown_scenes(results: pd.DataFrame) -> list[str]:

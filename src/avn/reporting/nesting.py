@@ -1,0 +1,56 @@
+"""Records of episodes as metrics of starts within sources within apartments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from avn.core.errors import UserError
+from avn.reporting.bootstrap import Nested
+
+# Column of the network of a record, in records of several networks.
+NETWORK = "train_seed"
+# A start is walked once with each sound.
+_START = ["scene", "source", "seed", "episode"]
+
+
+def nested(episodes: pd.DataFrame, columns: Sequence[str]) -> Nested:
+    """Return the metrics of episodes by start, source and apartment, in an order of their own.
+
+    Parameters
+    ----------
+    episodes : DataFrame
+        Records of one agent. Those of several networks have the column `NETWORK`.
+    columns : sequence of str
+        Columns of the metrics.
+
+    Raises
+    ------
+    UserError
+        If the networks have different episodes.
+    """
+    networks = [NETWORK] if NETWORK in episodes else []
+    ordered = episodes.sort_values([*_START, *networks, "sound"], kind="stable")
+    start = ordered.groupby(_START, sort=True).ngroup().to_numpy()
+    source = ordered.groupby(["scene", "source"], sort=True).ngroup().to_numpy()
+    scene = ordered.groupby("scene", sort=True).ngroup().to_numpy()
+    network = np.zeros(len(start), dtype=np.int64)
+    if networks:
+        network = ordered.groupby(NETWORK, sort=True).ngroup().to_numpy()
+    count = int(network.max()) + 1
+    cell = start * count + network
+    sizes = np.bincount(cell, minlength=(start[-1] + 1) * count).reshape(-1, count)
+    if (sizes != sizes[:, :1]).any():
+        raise UserError("train_seed: the networks walked different episodes; run all of them")
+    firsts = np.flatnonzero(np.diff(cell, prepend=-1))
+    places = np.flatnonzero(np.diff(start, prepend=-1))
+    sums = np.add.reduceat(ordered[list(columns)].to_numpy(np.float64), firsts)
+    own = source[places]
+    return Nested(
+        sums=sums.reshape(*sizes.shape, -1),
+        counts=sizes[:, 0].astype(np.float64),
+        source=own,
+        scene=scene[places][np.flatnonzero(np.diff(own, prepend=-1))],
+    )
