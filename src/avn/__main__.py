@@ -12,6 +12,7 @@ COMMANDS = {
     "reproduce": "run all rows with all seeds, and print the whole table",
     "figures": "draw trajectories, estimates and maps of finished runs",
     "report": "write one HTML page of finished runs, with views and sound",
+    "compare": "compare runs over the same episodes",
     "ls": "list finished runs with their world, success rate and SPL",
     "rm": "list products that no run needs, and delete them on request",
 }

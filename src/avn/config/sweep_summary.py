@@ -1,17 +1,31 @@
-"""Summary of a sweep: mean and standard deviation over the seeds of each setting."""
+"""Summary of a sweep: means over seeds and networks of each setting, and their differences."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from avn.core.errors import UserError
 from avn.core.files import stage_folder
 from avn.core.hashing import digest
 from avn.core.progress import log
-from avn.reporting.results import AVERAGE, across_seeds, read_csv, write_csv
+from avn.reporting.comparison import INDEPENDENT, compare
+from avn.reporting.comparison_table import line
+from avn.reporting.finished_run import EPISODE_RECORDS
+from avn.reporting.nesting import NETWORK
+from avn.reporting.results import (
+    AVERAGE,
+    INTERVAL,
+    NETWORK_INTERVAL,
+    NO_INTERVAL,
+    across_runs,
+    read_csv,
+    write_csv,
+)
 
 
 def summarise(records: Iterable[Mapping[str, Any]], tell_folder: bool) -> None:
@@ -20,17 +34,21 @@ def summarise(records: Iterable[Mapping[str, Any]], tell_folder: bool) -> None:
     Parameters
     ----------
     records : iterable of mapping
-        Record of each job: its `setting`, and `folder` and `outputs` of its results, or None.
+        Record of each job: its `setting` and `train_seed`, and `folder` and `outputs` of its
+        results, or None.
     tell_folder : bool
         Whether the folder of the summary is printed.
     """
     # seed=0,0 are two jobs and one run
     runs = {(record["setting"], record["folder"]): record for record in records if record["folder"]}
     finished = list(runs.values())
-    summary = _spread(finished)
-    if not len(summary):
+    episodes = _episodes(finished)
+    if not episodes:
         return
+    tables = [across_runs(own).assign(setting=key) for key, own in episodes.items()]
+    summary = pd.concat(tables, ignore_index=True)
     _print(summary)
+    _compare(episodes)
     for note in dict.fromkeys(record["note"] for record in finished if record["note"]):
         log(note)
     outputs = Path(finished[0]["outputs"])
@@ -41,25 +59,69 @@ def summarise(records: Iterable[Mapping[str, Any]], tell_folder: bool) -> None:
         log(str(path.parent))
 
 
-def _spread(finished: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
-    """Return mean and standard deviation over seeds, for each setting of the other keys."""
-    tables: dict[str, list[pd.DataFrame]] = {}
+def _episodes(finished: Iterable[Mapping[str, Any]]) -> dict[str, pd.DataFrame]:
+    """Return the episodes of all seeds and networks by setting.
+
+    Where jobs failed, so that networks have other seeds, each network is a setting of its own.
+    """
+    runs: dict[str, list[pd.DataFrame]] = {}
     for record in finished:
-        path = Path(record["folder"]) / "results.csv"
+        path = Path(record["folder"]) / EPISODE_RECORDS
         if path.is_file():
-            tables.setdefault(record["setting"], []).append(read_csv(path))
-    spreads = [across_seeds(pd.concat(runs)).assign(setting=key) for key, runs in tables.items()]
-    return pd.concat(spreads, ignore_index=True) if spreads else pd.DataFrame()
+            own = read_csv(path).assign(**{NETWORK: record["train_seed"]})
+            runs.setdefault(record["setting"], []).append(own)
+    found: dict[str, pd.DataFrame] = {}
+    for setting, parts in runs.items():
+        episodes = pd.concat(parts, ignore_index=True)
+        seeds = episodes.groupby(NETWORK)["seed"].agg(lambda own: str(sorted(set(own))))
+        if seeds.nunique() == 1:
+            found[setting] = episodes
+            continue
+        for network, own in episodes.groupby(NETWORK):
+            found[", ".join(filter(None, (setting, f"{NETWORK}={network}")))] = own
+    return found
 
 
 def _print(summary: pd.DataFrame) -> None:
-    for row in summary[summary["scene"] == AVERAGE].to_dict("records"):
-        metrics = ", ".join(
-            f"{metric.upper()} {100 * row[metric]:.1f}"
-            + (f" +- {100 * row[metric + '_std']:.1f} %" if row["seeds"] > 1 else " %")
-            for metric in ("sr", "spl")
-        )
+    average = summary[summary["scene"] == AVERAGE]
+    for row in average.to_dict("records"):
+        metrics = ", ".join(_metric(row, metric) for metric in ("sr", "spl"))
         labels = f"{row['agent']}, {row['sound']} ({row['setting'] or 'defaults'})"
         labels += f", {row['protocol']}, {row['acoustics']}"
-        seeds = "1 seed" if row["seeds"] == 1 else f"{row['seeds']} seeds"
-        log(f"{labels}, {seeds}: {metrics}")
+        counts = "1 seed" if row["seeds"] == 1 else f"{row['seeds']} seeds"
+        if row["networks"] > 1:
+            counts += f", mean over {row['networks']} networks"
+        log(f"{labels}, {counts}: {metrics}")
+    known = average["sr_low"].notna()
+    if known.any():
+        several = (average.loc[known, "networks"] > 1).any()
+        log(f"in brackets: {NETWORK_INTERVAL if several else INTERVAL}")
+    if not known.all():
+        log(f"without brackets: {NO_INTERVAL}")
+
+
+def _metric(row: Mapping[Any, Any], metric: str) -> str:
+    """Format a metric with its spread over seeds and networks and its interval."""
+    text = f"{metric.upper()} {100 * row[metric]:.1f}"
+    text += f" +- {100 * row[f'{metric}_std']:.1f} %" if row["seeds"] > 1 else " %"
+    if row["networks"] > 1:
+        text += f", sd between networks {100 * row[f'{metric}_network_std']:.1f}"
+    if not math.isnan(row[f"{metric}_low"]):
+        text += f" [{100 * row[f'{metric}_low']:.1f} to {100 * row[f'{metric}_high']:.1f}]"
+    return text
+
+
+def _compare(episodes: Mapping[str, pd.DataFrame]) -> None:
+    """Print the difference of each setting to the first one, over the same episodes."""
+    (first, base), *others = ((key or "defaults", own) for key, own in episodes.items())
+    tested = False
+    for setting, own in others:
+        try:
+            found = compare(own, base, (setting, first))
+        except UserError as error:
+            log(f"{setting} less {first}: not compared, {error}")
+            continue
+        tested = tested or found.mcnemar is not None
+        log(line(found, setting, first))
+    if tested:
+        log(f"{INDEPENDENT}.")

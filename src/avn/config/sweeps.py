@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
 from avn.core.errors import UserError
 from avn.reporting.world import trial_note
@@ -59,7 +59,9 @@ def run_job(
     job = HydraConfig.get().job
     overrides = list(HydraConfig.get().overrides.task)
     record: dict[str, Any] = {"overrides": ", ".join(overrides), "folder": None, "error": None}
-    record["setting"] = ", ".join(o for o in overrides if not o.startswith("seed="))
+    repeated = ("seed=", "train_seed=")
+    record["setting"] = ", ".join(o for o in overrides if not o.startswith(repeated))
+    record["train_seed"] = OmegaConf.select(cfg, "train_seed")
     try:
         folder = task(cfg)
         record["folder"] = str(folder) if folder else None

@@ -20,7 +20,7 @@ from avn.pipeline.observed import RunObservations, soundtrack
 from avn.pipeline.replay import Run
 from avn.pipeline.run_names import names_of, settings_but_seed
 from avn.reporting import page, page_media
-from avn.reporting.results import across_seeds, summarise
+from avn.reporting.results import across_runs
 
 
 def write_page(
@@ -140,14 +140,12 @@ def _together(runs: Sequence[Run], pages: Sequence[page.PageRun]) -> page.PageRu
         folder=", ".join(one.folder for one in pages),
         settings=pages[0].settings,
         privileged=pages[0].privileged,
-        # one seed for all, so that the intervals are over all episodes of a source
-        results=summarise(episodes.assign(seed=0)),
+        results=across_runs(episodes),
         episodes=episodes,
         media=media,
         paths=[path for one in pages for path in one.paths or []] or None,
         world=pages[0].world,
         paper=frozenset.intersection(*(frozenset(one.paper) for one in pages)),
-        seeds=across_seeds(pd.concat([one.results for one in pages])),
     )
 
 

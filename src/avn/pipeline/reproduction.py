@@ -19,8 +19,10 @@ from avn.pipeline.dashboard import Dashboard
 from avn.pipeline.run import Evaluation, agent_label
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stage import announce, discard_if_forced, make, missing, timings
-from avn.reporting import published, results, table
-from avn.reporting.finished_run import RESULTS, read_run
+from avn.reporting import comparison_table, published, results, table
+from avn.reporting.comparison import INDEPENDENT, compare
+from avn.reporting.finished_run import RESULTS, read_episodes, read_run
+from avn.reporting.nesting import NETWORK
 from avn.reporting.paper import paper_averages
 
 # Files beside `results.csv`.
@@ -62,9 +64,10 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig], defaults: Sequence[Di
     paper = paper_sounds_by_agent(rows, defaults)
     folders = _make_runs(configs, paper)
     tables, episodes = zip(*map(read_run, folders), strict=True)
-    runs, records = pd.concat(tables), pd.concat(episodes)
+    networks = [config.train_seed for config in configs]
+    runs, records = (_with_networks(own, networks) for own in (tables, episodes))
     privileged = {agent_label(config) for config in configs if config.agent.privileged}
-    cells = published.published(runs, records, paper)
+    cells = published.published(records, paper)
     caption = _caption(rows, defaults)
     table.print_table(published.terminal(cells, privileged), caption)
     if legend := published.legend(cells):
@@ -76,7 +79,7 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig], defaults: Sequence[Di
         (TABLE, published.markdown(cells, sounds, privileged, caption)),
         (LATEX, published.latex(cells, sounds, privileged, caption)),
     )
-    _write(target, runs, cells, files)
+    _write(target, runs, records, cells, files)
     _compare(records)
     return target
 
@@ -139,7 +142,7 @@ class _Rows:
 
 def _average(folders: Sequence[Path]) -> str:
     """Return success rate and SPL of some runs in percent, over all sounds and scenes."""
-    runs = pd.concat([read_run(folder)[0] for folder in folders])
+    runs = pd.concat([results.summarise(read_episodes(folder), draws=0) for folder in folders])
     average = runs[runs["scene"] == results.AVERAGE]
     all_sounds = average[average["sound"] == results.ALL_SOUNDS]
     mean = 100.0 * (all_sounds if len(all_sounds) else average)[["sr", "spl"]].mean()
@@ -160,12 +163,34 @@ def _runs(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:
     return runs
 
 
+def _with_networks(tables: Sequence[pd.DataFrame], networks: Sequence[int]) -> pd.DataFrame:
+    """Join the tables of runs, with the network of each run as the last column."""
+    pairs = zip(tables, networks, strict=True)
+    return pd.concat([own.assign(**{NETWORK: network}) for own, network in pairs])
+
+
 def _write(
-    target: Path, runs: pd.DataFrame, cells: pd.DataFrame, files: Sequence[tuple[str, str]]
+    target: Path,
+    runs: pd.DataFrame,
+    records: pd.DataFrame,
+    cells: pd.DataFrame,
+    files: Sequence[tuple[str, str]],
 ) -> None:
-    """Write the table as CSV and as texts by file name, and the durations of the stages."""
+    """Write the table as CSV and as texts by file name, and the durations of the stages.
+
+    Parameters
+    ----------
+    target : Path
+        Folder of the table.
+    runs, records : DataFrame
+        Results and episodes of all runs.
+    cells : DataFrame
+        As `avn.reporting.published.published` returns it.
+    files : sequence of (str, str)
+        Names and texts of the other files.
+    """
     results.write_csv(runs, target / RESULTS)
-    results.write_csv(results.across_seeds(runs), target / ACROSS)
+    results.write_csv(results.across_runs(records), target / ACROSS)
     results.write_csv(cells, target / CELLS)
     for name, text in files:
         with atomic_write(target / name) as part:
@@ -179,15 +204,10 @@ def _write(
 
 
 def _compare(episodes: pd.DataFrame) -> None:
-    """Print the difference in SPL of each row to the one before it, over the same episodes."""
+    """Print the difference of each row to the one before it, over the same episodes."""
     rows = list(dict.fromkeys(episodes["agent"]))
-    metrics = [*results.METRICS.values()]
-    keys = ["agent", "sound", "scene", "seed", "episode", "source", "start_cell", "start_heading"]
-    mean = episodes.groupby(keys, as_index=False)[metrics].mean()  # over networks
     for one, other in zip(rows[1:], rows, strict=False):
-        differences = results.compare(mean[mean["agent"] == one], mean[mean["agent"] == other])
-        spl = differences.set_index("metric").loc["spl"] * 100
-        interval = f"95 % interval {spl['low']:+.1f} to {spl['high']:+.1f}"
-        if spl.isna().any():
-            interval = results.NO_INTERVAL
-        log(f"{one} less {other}: SPL {spl['difference']:+.1f} points ({interval})")
+        first, second = (episodes[episodes["agent"] == row] for row in (one, other))
+        log(comparison_table.line(compare(first, second, (one, other)), one, other))
+    if len(rows) > 1:
+        log(f"{INDEPENDENT}.")

@@ -21,15 +21,16 @@ from avn.reporting.nesting import NETWORK
 from avn.reporting.results import read_csv
 
 _RECORDINGS = "recordings.csv"
+# Prefix of the hash of a sound's recording among the settings.
+_HASH = "recording.of."
 # Settings in which the runs of a side may differ, and those that change no record.
 _REPEATED = ("seed", NETWORK)
 _NO_RECORD = (*MACHINE, "film", "film_show", "film_speed")
 # Settings of the episodes: both sides of a comparison have the same.
 _EPISODES = (
     *("split.name", "split.folder", "split.seed", "split.size", "split.test", "split.sources"),
-    *("subset", "episodes", "protocol", "sound"),
+    *("subset", "episodes", "protocol", "sound", "recording"),
 )
-_ABSENT = "none"
 # Differing settings of two sides that are named; further ones are counted.
 _MOST = 4
 
@@ -47,7 +48,7 @@ class Side:
     seeds, networks : tuple of int
         Values of `seed` and `train_seed`.
     settings : dict of str to str
-        Values by dotted key, without the seeds; of a sound, the hash of its recording.
+        Values by dotted key, without the seeds, and the hashes of the recordings.
     episodes : DataFrame
         Records of all runs, with the column `train_seed`.
     """
@@ -75,7 +76,8 @@ def open_side(text: str, outputs: Path) -> Side:
     UserError
         Where a run is not found, unfinished or damaged, or the runs are not of one setting.
     """
-    folders = [find_run(part, outputs) for part in text.split(",")]
+    parts = [text] if Path(text).is_dir() else text.split(",")
+    folders = [find_run(part, outputs) for part in parts]
     configs = [_config(folder) for folder in folders]
     settings = [_settings(cfg, folder) for cfg, folder in zip(configs, folders, strict=True)]
     for own, folder in zip(settings[1:], folders[1:], strict=True):
@@ -115,6 +117,10 @@ def find_run(text: str, outputs: Path) -> Path:
         raise UserError("RUN: empty; give a run's folder or a name that avn ls lists")
     if Path(text).is_dir():
         return Path(text)
+    if not outputs.is_dir():
+        raise UserError(
+            f"{text}: no folder, and there is no {outputs}; name it by --outputs FOLDER"
+        )
     found = [folder for folder in run_folders(outputs) if text in _names(folder)]
     if not found:
         raise UserError(f"{text}: neither a folder nor a run of {outputs}; avn ls lists its runs")
@@ -133,9 +139,7 @@ def differences(one: Side, other: Side) -> list[str]:
     named = [key for key in keys if key.endswith(".name") or not _is_below(key, groups)]
     named = [key for key in named if key != "agent.name"] if one.name != other.name else named
     texts = [
-        f"{key.removesuffix('.name')} {one.settings.get(key, _ABSENT)} / "
-        f"{other.settings.get(key, _ABSENT)}"
-        for key in named
+        f"{key.removesuffix('.name')} {one.settings[key]} / {other.settings[key]}" for key in named
     ]
     more = [f"{len(texts) - _MOST} more settings"] if len(texts) > _MOST else []
     return texts[:_MOST] + more
@@ -151,10 +155,9 @@ def compare_sides(one: Side, other: Side) -> Comparison:
     """
     for key in _differing(one.settings, other.settings):
         if _is_below(key, _EPISODES) or key in _EPISODES:
-            values = [side.settings.get(key, _ABSENT) for side in (one, other)]
+            values = [f"{side.settings[key]} in {side.given}" for side in (one, other)]
             raise UserError(
-                f"{key}: {values[0]} in {one.given} and {values[1]} in {other.given}; only runs of "
-                "the same episodes are compared"
+                f"{key}: {' and '.join(values)}; only runs of the same episodes are compared"
             )
     return compare(one.episodes, other.episodes, (one.given, other.given))
 
@@ -177,17 +180,15 @@ def _config(folder: Path) -> dict[str, Any]:
 def _settings(cfg: Mapping[str, Any], folder: Path) -> dict[str, str]:
     """Return the settings of a run that tell it from runs that are no repetitions of it."""
     left = {key: value for key, value in cfg.items() if key not in (*_REPEATED, *_NO_RECORD)}
-    found = {
-        key: value for key, value in _leaves(left) if key.rpartition(".")[2] not in (NETWORK,)
-    }
+    found = {key: value for key, value in _leaves(left) if key.rpartition(".")[2] != NETWORK}
+    if not (folder / _RECORDINGS).is_file():
+        return found
     try:
-        kept = read_csv(folder / _RECORDINGS) if (folder / _RECORDINGS).is_file() else None
-        if kept is not None:
-            hashes = zip(kept["sound"], kept["sha256"], strict=True)
-            found |= {f"sound.{name}": str(value)[:8] for name, value in hashes}
+        kept = read_csv(folder / _RECORDINGS)
+        hashes = dict(zip(kept["sound"], kept["sha256"], strict=True))
     except (OSError, ValueError, KeyError) as error:
         raise UserError(f"{folder}: {_RECORDINGS} is damaged; run avn.eval again") from error
-    return found
+    return found | {f"{_HASH}{name}": str(value)[:8] for name, value in hashes.items()}
 
 
 def _leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
@@ -199,8 +200,13 @@ def _leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, st
 
 
 def _differing(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
-    keys = dict.fromkeys((*one, *other))
-    return [key for key in keys if one.get(key) != other.get(key)]
+    """Return the keys with different values, of those that both have.
+
+    A config of an earlier version has fewer keys. A recording is compared by its hash where both
+    have it, otherwise by its path.
+    """
+    hashed = {key.replace(_HASH, "sound.") for key in one if key in other and _HASH in key}
+    return [key for key in one if key in other and key not in hashed and one[key] != other[key]]
 
 
 def _is_below(key: str, nodes: Sequence[str] | set[str]) -> bool:

@@ -17,6 +17,7 @@ resamples. With a single level this is Hesterberg's expanded percentile interval
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -229,7 +230,7 @@ def _drawn(pools: Floats, parent: Integers, draws: int, rng: np.random.Generator
     """Resample the members of each parent: (members, rows, C) to (parents, draws, C)."""
     firsts = np.searchsorted(parent, np.arange(parent[-1] + 2))
     found = np.empty((len(firsts) - 1, draws, pools.shape[2]))
-    for index, (first, end) in enumerate(zip(firsts[:-1], firsts[1:], strict=True)):
+    for index, (first, end) in enumerate(pairwise(firsts.tolist())):
         member = rng.integers(first, end, size=(end - first, draws))
         row = rng.integers(pools.shape[1], size=member.shape)
         found[index] = pools[member, row].sum(axis=0)

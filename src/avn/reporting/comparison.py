@@ -154,5 +154,5 @@ def detectable(error: Floats, df: Floats) -> Floats:
     df : (M,) float64
         Degrees of freedom of the errors.
     """
-    multiple: Floats = stdtrit(df, 0.5 + LEVEL / 2) + stdtrit(df, POWER)
-    return multiple * error
+    multiple = stdtrit(df, 0.5 + LEVEL / 2) + stdtrit(df, POWER)
+    return np.asarray(multiple * error, dtype=np.float64)

@@ -51,6 +51,6 @@ def nested(episodes: pd.DataFrame, columns: Sequence[str]) -> Nested:
     return Nested(
         sums=sums.reshape(*sizes.shape, -1),
         counts=sizes[:, 0].astype(np.float64),
-        source=own,
-        scene=scene[places][np.flatnonzero(np.diff(own, prepend=-1))],
+        source=own.astype(np.int64),
+        scene=scene[places][np.flatnonzero(np.diff(own, prepend=-1))].astype(np.int64),
     )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from itertools import combinations
 from typing import Any
 
 import jinja2
@@ -13,9 +14,11 @@ import pandas as pd
 
 from avn.core.errors import UserError
 from avn.reporting.breakdown import breakdown_figure
+from avn.reporting.comparison import INDEPENDENT, compare
+from avn.reporting.comparison_table import line, mcnemar_line
 from avn.reporting.page_media import figure_url
 from avn.reporting.paper import PAPER, paper_results
-from avn.reporting.results import ALL_SOUNDS, AVERAGE, NO_INTERVAL, compare
+from avn.reporting.results import ALL_SOUNDS, AVERAGE, INTERVAL, NO_INTERVAL
 from avn.reporting.trajectory_figures import RUN_COLOURS
 
 _TEMPLATES = "avn.reporting"
@@ -35,15 +38,14 @@ class PageRun:
     privileged : bool
         True if the agent uses ground truth that is not observable.
     results, episodes : DataFrame
-        `results.csv` and `episodes.csv`.
+        `results.csv` and `episodes.csv`; of a group of runs that differ only in their seed, the
+        results are those of `avn.reporting.results.across_runs`.
     media : dict of int to int
         Index of the embedded episode by row of `episodes.csv`.
     paths : list of dict, optional
         Index of the `plan` and `states` of the path of each episode.
-    seeds : DataFrame, optional
-        For a group of runs that differ only in their seed: its `results.across_seeds`.
     within : bool
-        True if the run is a member of such a group.
+        True if the run is a member of a group of runs that differ only in their seed.
     world : str
         World of the run in words; see `avn.pipeline.benchmark.describe_world`.
     paper : collection of str
@@ -58,7 +60,6 @@ class PageRun:
     episodes: pd.DataFrame
     media: dict[int, int]
     paths: list[dict[str, Any]] | None = None
-    seeds: pd.DataFrame | None = None
     within: bool = False
     world: str = ""
     paper: Collection[str] = ()
@@ -111,12 +112,15 @@ def render(
             }
             for index, run in enumerate(runs)
         ],
+        "comparisons": _comparisons(runs),
     }
     return environment.get_template("report.html.j2").render(
         title=title,
         note=note,
         worlds=list(dict.fromkeys(run.world for run in runs if run.world)),
+        interval=INTERVAL,
         no_interval=NO_INTERVAL,
+        independent=INDEPENDENT,
         intervals_missing=any(
             cell and cell["sr_low"] is None for row in rows for cell in row["cells"]
         ),
@@ -160,10 +164,7 @@ def _rows(index: int, run: PageRun, scenes: Sequence[str]) -> list[dict[str, Any
     for sound, part in run.results.groupby("sound", sort=False):
         own = {str(row["scene"]): row for row in part.to_dict("records")}
         paper = _paper(str(part["agent"].iloc[0]), str(sound), run.paper)
-        cells = [
-            _cell(run, str(sound), own[scene], paper.get(scene)) if scene in own else None
-            for scene in scenes
-        ]
+        cells = [_cell(own[scene], paper.get(scene)) if scene in own else None for scene in scenes]
         rows.append(
             {
                 "run": index,
@@ -177,12 +178,10 @@ def _rows(index: int, run: PageRun, scenes: Sequence[str]) -> list[dict[str, Any
     return rows
 
 
-def _cell(
-    run: PageRun, sound: str, row: dict[Hashable, Any], paper: tuple[float, float] | None
-) -> dict[str, Any]:
+def _cell(row: dict[Hashable, Any], paper: tuple[float, float] | None) -> dict[str, Any]:
     """Return a cell of the table in %, in full precision; missing intervals are None."""
     scene = str(row["scene"])
-    cell: dict[str, Any] = {"scene": scene, "paper": paper, "spread": _spread(run, sound, scene)}
+    cell: dict[str, Any] = {"scene": scene, "paper": paper, "spread": _spread(row)}
     for metric in ("sr", "spl"):
         cell[metric] = 100 * row[metric]
         for end in _ENDS:
@@ -191,27 +190,39 @@ def _cell(
     return cell
 
 
-def _spread(run: PageRun, sound: str, scene: str) -> tuple[float, float] | None:
+def _spread(row: dict[Hashable, Any]) -> tuple[float, float] | None:
     """Return the standard deviation of success rate and SPL over seeds in percentage points."""
-    if run.seeds is None:
-        return None
-    chosen = (run.seeds["sound"] == sound) & (run.seeds["scene"] == scene)
-    row = 100 * run.seeds[chosen].iloc[0][["sr_std", "spl_std"]].astype(float)
-    return None if row.isna().any() else (float(row["sr_std"]), float(row["spl_std"]))
+    spread = [100 * row.get(f"{metric}_std", math.nan) for metric in ("sr", "spl")]
+    return None if math.isnan(spread[0]) else (spread[0], spread[1])
+
+
+def _comparisons(runs: Sequence[PageRun]) -> dict[str, list[str]]:
+    """Compare all pairs of runs, by their indices: in words, the first one as A and as B."""
+    lines = {}
+    for (i, one), (j, other) in combinations(enumerate(runs), 2):
+        try:
+            found = compare(one.episodes, other.episodes, (one.name, other.name))
+            lines[f"{i}-{j}"] = [line(found, "A", "B"), line(found, "B", "A")]
+        except UserError as error:
+            lines[f"{i}-{j}"] = 2 * [f"Not compared: {error}"]
+    return lines
 
 
 def _differences(runs: Sequence[PageRun]) -> list[dict[str, Any]]:
-    """Compute paired differences of each run to the first, if both have the same episodes."""
-    rows = []
+    """Compare each run with the first over the same episodes; a reason where it is not possible."""
+    rows: list[dict[str, Any]] = []
     first, *others = (run for run in runs if not run.within)
     for run in others:
         try:
-            table = compare(run.episodes, first.episodes).set_index("metric")
-        except UserError:
+            found = compare(run.episodes, first.episodes, (run.name, first.name))
+        except UserError as error:
+            rows.append({"name": run.name, "reason": str(error)})
             continue
-        points = 100 * table.loc[["sr", "spl"], ["difference", "low", "high"]].to_numpy()
-        known = [[None if math.isnan(value) else value for value in row] for row in points.tolist()]
-        rows.append({"name": run.name, "sr": known[0], "spl": known[1]})
+        table = 100 * found.table.set_index("metric").loc[["sr", "spl"]]
+        columns = table[["difference", "low", "high", "detectable"]].to_numpy().tolist()
+        sr, spl = ([None if math.isnan(v) else v for v in values] for values in columns)
+        test = "" if found.mcnemar is None else mcnemar_line(found, run.name, first.name)
+        rows.append({"name": run.name, "sr": sr, "spl": spl, "test": test, "over": found.over})
     return rows
 
 

@@ -14,24 +14,23 @@ from rich.text import Text
 from avn.reporting.paper import PAPER, paper_results
 from avn.reporting.results import (
     ALL_SOUNDS,
+    INTERVAL,
     LABELS,
+    NETWORK_INTERVAL,
     NO_INTERVAL,
     USUAL_LOOK,
-    across_seeds,
+    across_runs,
     shown_scenes,
-    summarise,
 )
 from avn.reporting.table import readable
 
-# Common seed, with which the episodes of several seeds are pooled into one run.
-_POOLED = -1
 # Lines of a cell.
-OWN, INTERVAL, SPREAD = "own", "95 %", "± over seeds"
+OWN, ENDS_LINE, SPREAD, NETWORKS = "own", "95 %", "± over seeds", "± over networks"
 ENDS = ("low", "high")
+_VALUES = ("", "_low", "_high", "_std", "_network_std")
 
 
 def published(
-    runs: pd.DataFrame,
     episodes: pd.DataFrame,
     paper: Mapping[str, Collection[str]] = MappingProxyType({}),
 ) -> pd.DataFrame:
@@ -39,10 +38,8 @@ def published(
 
     Parameters
     ----------
-    runs : DataFrame
-        Results of all runs; see `avn.reporting.results.summarise`.
     episodes : DataFrame
-        Episodes of all runs.
+        Episodes of all runs, those of several networks with a column `train_seed`.
     paper : mapping of str to collection of str
         Sounds by agent beside which the paper's results stand; see
         `avn.reporting.paper.paper_results`.
@@ -50,17 +47,13 @@ def published(
     Returns
     -------
     DataFrame
-        `LABELS`, `sound`, `scene`; `sr` and `spl`, means over runs in %; `sr_low` to `spl_high`,
-        95 % confidence intervals over (scene, source) clusters of the pooled episodes, NaN where
-        there are too few; `sr_std` and `spl_std`, standard deviations over seeds; `paper_sr` and
-        `paper_spl`, NaN where the paper's results do not belong.
+        `LABELS`, `sound`, `scene`, `networks`; `sr` and `spl`, means over runs in %; `sr_low` to
+        `spl_high`, the 95 % intervals of `avn.reporting.results.across_runs`; `sr_std` and
+        `spl_std`, standard deviations over seeds, and `sr_network_std` and `spl_network_std`, over
+        networks; `paper_sr` and `paper_spl`, NaN where the paper's results do not belong.
     """
-    keys = [*LABELS, "sound", "scene"]
-    intervals = summarise(episodes.assign(seed=_POOLED))
-    ends = [f"{metric}_{end}" for metric in ("sr", "spl") for end in ENDS]
-    spread = across_seeds(runs)[[*keys, "sr", "spl", "sr_std", "spl_std"]]
-    found = spread.merge(intervals[[*keys, *ends]], on=keys, how="left", sort=False)
-    percent = ["sr", "spl", "sr_std", "spl_std", *ends]
+    percent = [f"{metric}{end}" for metric in ("sr", "spl") for end in _VALUES]
+    found = across_runs(episodes)[[*LABELS, "sound", "scene", "networks", *percent]]
     found[percent] *= 100.0
     own = paper_results(paper).rename(columns={"sr": "paper_sr", "spl": "paper_spl"})
     return found.merge(own, on=["agent", "sound", "scene"], how="left", sort=False)
@@ -79,7 +72,7 @@ def terminal(cells: pd.DataFrame, privileged: Collection[str] = ()) -> Table:
         for sound, part in own.groupby("sound", sort=False):
             lines = pd.DataFrame(map(_lines, _in_scenes(part, scenes)))
             table.add_row(Text(f"  {sound}"), *lines[OWN])
-            for name in (INTERVAL, SPREAD, PAPER):
+            for name in (ENDS_LINE, SPREAD, NETWORKS, PAPER):
                 if lines[name].any():
                     table.add_row(f"    {name}", *lines[name], style="dim")
     return table
@@ -89,9 +82,12 @@ def legend(cells: pd.DataFrame) -> str:
     """Name the lines below each pair of success rate and SPL, and what is missing and why."""
     lines = []
     if cells["sr_low"].notna().any():
-        lines.append("the 95 % interval")
+        over = NETWORK_INTERVAL if (cells["networks"] > 1).any() else INTERVAL
+        lines.append(f"the interval ({over})")
     if cells["sr_std"].notna().any():
         lines.append("the standard deviation over seeds")
+    if cells["sr_network_std"].notna().any():
+        lines.append(f"the standard deviation over {cells['networks'].max()} networks")
     if cells["paper_sr"].notna().any():
         lines.append(f"in parentheses, the results of the paper ({PAPER})")
     text = f"Below each pair: {'; '.join(lines)}." if lines else ""
@@ -207,14 +203,15 @@ def _lines(row: dict[Hashable, Any]) -> dict[str, str]:
     ends = [one if one == other else f"{one}-{other}" for one, other in zip(low, high, strict=True)]
     return {
         OWN: _pair(row["sr"], row["spl"]),
-        INTERVAL: "" if np.isnan(row["sr_low"]) else " / ".join(ends),
+        ENDS_LINE: "" if np.isnan(row["sr_low"]) else " / ".join(ends),
         SPREAD: _pair(row["sr_std"], row["spl_std"]),
+        NETWORKS: _pair(row["sr_network_std"], row["spl_network_std"]),
         PAPER: _pair(row["paper_sr"], row["paper_spl"]),
     }
 
 
 def _stacked(lines: dict[str, str], between: str) -> str:
-    marked = {INTERVAL: "[{}]", SPREAD: "± {}", PAPER: "({})"}
+    marked = {ENDS_LINE: "[{}]", SPREAD: "± {}", NETWORKS: "± {} over networks", PAPER: "({})"}
     found = [marked.get(name, "{}").format(line) for name, line in lines.items() if line]
     return between.join(found)
 
