@@ -18,7 +18,6 @@ from avn.pipeline.stage import MACHINE
 from avn.reporting.comparison import Comparison, compare
 from avn.reporting.finished_run import EPISODE_RECORDS, RESULTS, read_episodes
 from avn.reporting.nesting import NETWORK
-from avn.reporting.results import read_csv
 
 _RECORDINGS = "recordings.csv"
 # Prefix of the hash of a sound's recording among the settings.
@@ -184,11 +183,11 @@ def _settings(cfg: Mapping[str, Any], folder: Path) -> dict[str, str]:
     if not (folder / _RECORDINGS).is_file():
         return found
     try:
-        kept = read_csv(folder / _RECORDINGS)
+        kept = pd.read_csv(folder / _RECORDINGS, dtype=str, keep_default_na=False)
         hashes = dict(zip(kept["sound"], kept["sha256"], strict=True))
     except (OSError, ValueError, KeyError) as error:
         raise UserError(f"{folder}: {_RECORDINGS} is damaged; run avn.eval again") from error
-    return found | {f"{_HASH}{name}": str(value)[:8] for name, value in hashes.items()}
+    return found | {f"{_HASH}{name}": value[:8] for name, value in hashes.items()}
 
 
 def _leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

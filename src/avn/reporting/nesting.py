@@ -36,7 +36,7 @@ def nested(episodes: pd.DataFrame, columns: Sequence[str]) -> Nested:
     start = ordered.groupby(_START, sort=True).ngroup().to_numpy()
     source = ordered.groupby(["scene", "source"], sort=True).ngroup().to_numpy()
     scene = ordered.groupby("scene", sort=True).ngroup().to_numpy()
-    network = np.zeros(len(start), dtype=np.int64)
+    network = np.zeros_like(start)
     if networks:
         network = ordered.groupby(NETWORK, sort=True).ngroup().to_numpy()
     count = int(network.max()) + 1
