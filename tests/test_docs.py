@@ -146,7 +146,7 @@ def compose(line, monkeypatch, outputs):
         monkeypatch.syspath_prepend(TOP / pythonpath)
     monkeypatch.chdir(TOP)
     assert name in COMMANDS, line
-    if name in ("figures", "report", "ls", "rm"):
+    if name in ("figures", "report", "compare", "ls", "rm"):
         importlib.import_module(f"avn.{name}")._parse(arguments)
         return 0
     monkeypatch.setattr(sys, "argv", [f"avn.{name}", *arguments, f"outputs={outputs}"])

@@ -6,10 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from browser import PHONE, chromium, opened, overflows, until
+from made_runs import records
 from small import EYES, SMALL, fitting
 
 from avn import report
 from avn.reporting import page_media
+from avn.reporting.comparison import compare
 from avn.reporting.page import PageRun, render
 from avn.reporting.results import EPISODE_COLUMNS, summarise
 
@@ -74,7 +76,7 @@ def test_figures_are_those_of_the_run_and_of_mini_they_mean_nothing(
         cell = shown.locator("td.cell[data-run='2'][data-sound=alarm][data-scene=room_1]")
         assert cell.inner_text().strip() == f"{row['sr']:.1f} / {row['spl']:.1f}"  # two sources
         words = shown.locator("header").inner_text()
-        assert "too few sources (fewer than 5) for an interval" in words
+        assert "too few sources (fewer than 5), for an interval" in words
         assert "its figures mean nothing" in words
         assert "test apartments of mini" in words
         assert "paper" not in shown.locator("main").inner_text()
@@ -106,6 +108,34 @@ def test_figures_are_rounded_once_and_the_papers_stand_where_they_belong(browser
             assert "15–15" in cell.inner_text()
             assert ("paper 12.0 / 10.5" in cell.inner_text()) == bool(paper)
             assert "Protocol x." in shown.locator("header").inner_text()
+
+
+def test_two_runs_have_an_interval_a_test_and_the_smallest_difference(browser, tmp_path):
+    walked = [records(agent, rate=rate) for agent, rate in (("one", 0.3), ("two", 0.7))]
+    walked.append(records("three").assign(protocol="stop"))
+    names = ("one", "two", "three")
+    runs = [
+        PageRun(name, "", "", False, summarise(own), own, {})
+        for name, own in zip(names, walked, strict=True)
+    ]
+    path = tmp_path / "page.html"
+    path.write_text(render("Runs", runs, [], [], []), encoding="utf-8")
+    with opened(browser, path) as shown:
+        assert "95 %, apartments, sources and episodes" in shown.locator("header").inner_text()
+        row = compare(walked[1], walked[0]).table.set_index("metric").loc["sr"] * 100
+        second, third = shown.locator("#differences tbody tr").all_inner_texts()
+        for text in (f"{row['low']:+.1f} to {row['high']:+.1f}", "McNemar's exact test", "p "):
+            assert text in second
+        assert f"smallest shown {row['detectable']:.1f}" in second
+        assert "not compared: three and one have different protocols (stop and var)" in third
+        shown.locator("#run-a").select_option("1")
+        shown.locator("#run-b").select_option("0")
+        tested = shown.locator("#tested").inner_text()
+        assert tested.startswith(f"B less A: success {-row['difference']:+.1f} points")
+        shown.locator("#run-b").select_option("2")
+        assert "Not compared" in shown.locator("#tested").inner_text()
+        shown.locator("#run-b").select_option("1")
+        assert shown.locator("#tested").inner_text() == ""
 
 
 def test_a_cell_opens_its_episodes_and_an_episode_plays(browser, page, command, outputs):
@@ -300,6 +330,11 @@ def test_two_runs_are_compared_episode_by_episode_with_the_keyboard(
         words = shown.locator("#compared").inner_text()
         only = (both["success_x"] > both["success_y"]).sum()
         assert f"{len(both)} common episodes. Only A succeeds: {only}." in words
+        tested = shown.locator("#tested").inner_text()
+        less = 100 * (both["success_x"].mean() - both["success_y"].mean())
+        assert tested.startswith(f"A less B: success {less:+.1f} points; SPL ")
+        assert "too few apartments" in tested  # mini has one, of two sources
+        assert "McNemar, episodes as independent, p" in tested
         rows = shown.locator("#pairs tbody tr")
         assert rows.count() == len(both)
         shown.locator("#who").select_option("00")

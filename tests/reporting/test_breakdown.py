@@ -12,6 +12,9 @@ def episodes() -> pd.DataFrame:
         {
             "scene": ["a", "a", "b", "b", "b"],
             "source": [0, 1, 0, 1, 2],
+            "seed": 0,
+            "episode": [0, 1, 0, 1, 2],
+            "sound": "ring",
             "geodesic": [1.0, 2.0, 5.5, 11.0, 12.0],
             "in_sight": [1, 1, 0, 0, 0],
             "rooms_crossed": [0, 0, 1, 3, 4],

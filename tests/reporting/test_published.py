@@ -7,8 +7,8 @@ import pytest
 from rich.console import Console
 
 from avn.reporting.paper import paper_table
-from avn.reporting.published import latex, markdown, published, terminal
-from avn.reporting.results import EPISODE_COLUMNS, summarise
+from avn.reporting.published import latex, legend, markdown, published, terminal
+from avn.reporting.results import EPISODE_COLUMNS
 
 
 def episodes(seed: int, share: float, agent: str = "greedy") -> pd.DataFrame:
@@ -31,7 +31,7 @@ def episodes(seed: int, share: float, agent: str = "greedy") -> pd.DataFrame:
 @pytest.fixture
 def table():
     walked = pd.concat([episodes(0, 0.3), episodes(1, 0.5)])
-    return published(summarise(walked), walked, {"greedy": ["ring"]}), walked
+    return published(walked, {"greedy": ["ring"]}), walked
 
 
 def test_cells_are_means_over_seeds_beside_the_papers_own(table):
@@ -81,7 +81,7 @@ def test_a_cell_has_its_interval_its_spread_and_the_papers_own(table):
 def test_a_full_table_fits_into_a_pipe():
     walked = episodes(0, 1.0, agent="ours_exp-true-pose")
     rooms = [walked.assign(room=f"room_{n}", seed=s) for n in range(1, 6) for s in (0, 1)]
-    cells = published(summarise(pd.concat(rooms)), pd.concat(rooms))
+    cells = published(pd.concat(rooms))
     console = Console(file=io.StringIO(), width=120)
     console.print(terminal(cells, ["ours_exp-true-pose"]))
     shown = console.file.getvalue()
@@ -91,11 +91,11 @@ def test_a_full_table_fits_into_a_pipe():
 
 def test_one_seed_has_no_spread_and_an_agent_of_ones_own_no_paper():
     walked = episodes(0, 0.3, agent="mine")
-    cells = published(summarise(walked), walked)
+    cells = published(walked)
     text = markdown(cells, ["ring", "a_b"])
     line = next(line for line in text.splitlines() if line.startswith("| `mine`"))
     assert line.count("|") == 5
-    assert line.count("[") == 3
+    assert line.count("[") == 2  # two apartments are too few for an average
     assert "±" not in line
     assert "(" not in line
 
@@ -111,20 +111,50 @@ def test_latex_escapes_names_and_has_as_many_cells_as_columns(table):
 
 def test_the_papers_figures_stand_where_they_belong_alone():
     walked = pd.concat([episodes(0, 0.3), episodes(1, 0.5)])
-    cells = published(summarise(walked), walked)
+    cells = published(walked)
     assert cells["paper_sr"].isna().all()
     text = markdown(cells, ["ring", "a_b"], caption="protocol var with max_moves_ratio=3.0")
     assert "paper" not in text
     assert "Protocol var with max_moves_ratio=3.0." in text
-    own = published(summarise(walked), walked, {"greedy": ["ring"]})
+    own = published(walked, {"greedy": ["ring"]})
     assert set(own.loc[own["paper_sr"].notna(), "sound"]) == {"ring"}
     assert "the results of the paper" in markdown(own, ["ring", "a_b"])
 
 
 def test_what_has_no_interval_is_said():
     walked = episodes(0, 0.3).query("source < 2")
-    cells = published(summarise(walked), walked)
+    cells = published(walked)
     for text in (markdown(cells, ["ring", "a_b"]), latex(cells, ["ring", "a_b"], caption="a_b")):
-        assert "too few sources (fewer than 5) for an interval" in text
+        assert "too few sources (fewer than 5), for an interval" in text
         assert "[" not in text
     assert r"\footnotesize a\_b" in latex(cells, ["ring", "a_b"], caption="a_b")
+
+
+def test_several_networks_have_a_line_of_their_own():
+    walked = pd.concat(
+        [
+            episodes(seed, share, agent="mine").assign(train_seed=network)
+            for network, share in enumerate((0.3, 0.5, 0.7))
+            for seed in (0, 1)
+        ]
+    )
+    cells = published(walked)
+    row = cells[(cells["scene"] == "average") & (cells["sound"] == "all")].iloc[0]
+    spread = 100 * walked.groupby("train_seed")["success"].mean().std()
+    assert row["sr_network_std"] == pytest.approx(spread)
+    assert f"± {spread:.1f} / {row['spl_network_std']:.1f} over networks" in markdown(
+        cells, ["ring", "a_b"]
+    )
+    assert "the standard deviation over 3 networks" in legend(cells)
+    console = Console(file=io.StringIO(), width=120)
+    console.print(terminal(cells))
+    assert "± over networks" in console.file.getvalue()
+
+
+def test_the_interval_says_what_is_resampled():
+    rooms = [episodes(0, 0.5).replace({"room_1": f"a_{n}", "room_2": f"b_{n}"}) for n in range(3)]
+    cells = published(pd.concat(rooms))
+    assert cells["sr_low"].notna().all()
+    for text in (legend(cells), markdown(cells, ["ring", "a_b"]), latex(cells, ["ring", "a_b"])):
+        assert "95 %, apartments, sources and episodes resampled" in text
+        assert "of this apartment only" in text

@@ -3,14 +3,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from made_runs import records
 
 from avn.core.errors import UserError
 from avn.reporting.results import (
     EPISODE_COLUMNS,
     INTERVALS,
     RESULT_COLUMNS,
-    across_seeds,
-    compare,
+    across_runs,
     headline,
     shown_scenes,
     summarise,
@@ -76,21 +76,40 @@ def test_figures_are_means_by_sound_and_room() -> None:
     assert row["episodes"] == 40
     for figure, column in (("sr", "success"), ("spl", "spl"), ("sna", "sna"), ("dtg", "dtg")):
         assert row[figure] == pytest.approx(own[column].mean())
-        assert row[f"{figure}_low"] < row[figure] < row[f"{figure}_high"]
+        assert row[f"{figure}_low"] < row[figure] < row[f"{figure}_high"]  # of five sources
 
 
-def test_too_few_sources_have_no_interval() -> None:
+def test_too_few_apartments_and_sources_have_no_interval() -> None:
     frame = episodes()
-    few = summarise(frame[frame["source"] < 2])  # two sources in each room, four in all
+    known = summarise(frame)["sr_low"].notna()
+    assert set(summarise(frame).loc[known, "scene"]) == {"room_1", "room_2"}  # of five sources
+    few = summarise(frame[frame["source"] < 4])
     assert few[list(INTERVALS)].isna().all(axis=None)
     assert few["sr"].notna().all()
-    some = summarise(frame[frame["source"] < 3])
-    known = some["sr_low"].notna()
-    assert set(some.loc[known, "scene"]) == {"average"}
-    one = episodes("oracle")
-    other = compare(frame[frame["source"] < 2], one[one["source"] < 2])
-    assert other[["low", "high"]].isna().all(axis=None)
-    assert other["difference"].notna().all()
+    five = summarise(records())
+    assert five[list(INTERVALS)].notna().all(axis=None)
+
+
+def test_the_average_varies_with_the_apartments_and_not_with_the_sources_alone() -> None:
+    # sources of one apartment are alike, so 25 of them say no more than the 5 apartments
+    frame = records(sounds=("ring",), starts=20)
+    rates = dict(zip(sorted(set(frame["scene"])), (0.1, 0.3, 0.5, 0.7, 0.9), strict=True))
+    frame["success"] = (frame["start_cell"] < frame["scene"].map(rates) * 20).astype(int)
+    table = summarise(frame).set_index("scene")
+    assert table.loc["room_1", ["sr_low", "sr_high"]].to_numpy(float) == pytest.approx(
+        [0.1, 0.1], abs=0.07
+    )
+    low, high = table.loc["average", ["sr_low", "sr_high"]]
+    assert low < 0.3
+    assert high > 0.7
+
+
+def test_the_order_of_the_records_does_not_count() -> None:
+    frame = records()
+    shuffled = frame.sample(frac=1, random_state=0)
+    keys = ["sound", "scene"]
+    tables = [summarise(own).sort_values(keys, ignore_index=True) for own in (frame, shuffled)]
+    pd.testing.assert_frame_equal(*tables, check_exact=True)
 
 
 def test_one_scene_has_no_average_of_its_own() -> None:
@@ -128,37 +147,40 @@ def test_no_episode_is_refused() -> None:
         summarise(episodes().iloc[:0])
 
 
-def test_across_seeds_gives_mean_and_spread() -> None:
-    results = pd.concat([summarise(episodes(seed=seed)) for seed in range(3)])
-    table = across_seeds(results)
-    assert len(table) == 9
+def test_across_runs_gives_mean_interval_and_spread_over_seeds() -> None:
+    walked = pd.concat([records(seed=seed) for seed in range(3)])
+    results = pd.concat([summarise(records(seed=seed), draws=0) for seed in range(3)])
+    table = across_runs(walked)
+    assert len(table) == 3 * 6
     row = only(table, sound="all", scene="average")
     figures = results[(results["sound"] == "all") & (results["scene"] == "average")]["sr"]
-    assert row["seeds"] == 3
+    assert (row["seeds"], row["networks"], row["episodes"]) == (3, 1, len(walked))
     assert row["sr"] == pytest.approx(figures.mean())
     assert row["sr_std"] == pytest.approx(np.std(figures, ddof=1))
+    assert row["sr_low"] < row["sr"] < row["sr_high"]
+    assert np.isnan(row["sr_network_std"])
 
 
-def test_compare_pairs_the_episodes() -> None:
-    one, other = episodes(), episodes("oracle")
-    shuffled = other.sample(frac=1.0, random_state=0)
-    table = compare(one, shuffled).set_index("metric")
-    rooms = (one["dtg"] - other["dtg"]).groupby(one["scene"]).mean()
-    assert table.loc["dtg", "difference"] == pytest.approx(rooms.mean())
-    assert (table["low"] < table["difference"]).all()
-    assert (table["difference"] < table["high"]).all()
-    # A constant gain is known exactly, however much the episodes differ.
-    better = one.assign(dtg=one["dtg"] - 0.5)
-    gain = compare(better, one).set_index("metric").loc["dtg"]
-    assert np.allclose(gain[["difference", "low", "high"]].to_numpy(dtype=float), -0.5)
-
-
-def test_compare_wants_the_same_episodes() -> None:
-    one = episodes()
-    with pytest.raises(UserError, match="same episodes"):
-        compare(one, episodes("oracle", sounds=("ring",)))
-    with pytest.raises(UserError, match="same episodes"):
-        compare(one, one.assign(start_heading=1))
+def test_across_runs_names_the_spread_between_networks_and_resamples_them() -> None:
+    walked = pd.concat(
+        [
+            records(seed=seed, draw=network, rate=0.3 + 0.2 * network).assign(train_seed=network)
+            for seed in (0, 1)
+            for network in range(3)
+        ]
+    )
+    row = only(across_runs(walked), sound="all", scene="average")
+    means = walked.groupby("train_seed")["success"].mean()
+    assert row["networks"] == 3
+    assert row["sr"] == pytest.approx(means.mean())
+    assert row["sr_network_std"] == pytest.approx(means.std())
+    seeds = walked.groupby("seed")["success"].mean()
+    assert row["sr_std"] == pytest.approx(seeds.std())
+    one = only(across_runs(walked.drop(columns="train_seed")), sound="all", scene="average")
+    assert row["sr_high"] - row["sr_low"] > 1.5 * (one["sr_high"] - one["sr_low"])
+    missing = walked[(walked["train_seed"] < 2) | (walked["seed"] < 1)]
+    with pytest.raises(UserError, match="train_seed: the networks walked different episodes"):
+        across_runs(missing)
 
 
 def test_write_csv_writes_what_can_be_read(tmp_path: Path) -> None:

@@ -222,7 +222,7 @@ def _differences(runs: Sequence[PageRun]) -> list[dict[str, Any]]:
         columns = table[["difference", "low", "high", "detectable"]].to_numpy().tolist()
         sr, spl = ([None if math.isnan(v) else v for v in values] for values in columns)
         test = "" if found.mcnemar is None else mcnemar_line(found, run.name, first.name)
-        rows.append({"name": run.name, "sr": sr, "spl": spl, "test": test, "over": found.over})
+        rows.append({"name": run.name, "sr": sr, "spl": spl, "test": test, "reason": ""})
     return rows
 
 
