@@ -131,7 +131,7 @@ def test_two_runs_have_an_interval_a_test_and_the_smallest_difference(browser, t
         shown.locator("#run-a").select_option("1")
         shown.locator("#run-b").select_option("0")
         tested = shown.locator("#tested").inner_text()
-        assert tested.startswith(f"B less A: success {-row['difference']:+.1f} points")
+        assert tested.startswith(f"A less B: success {row['difference']:+.1f} points")
         shown.locator("#run-b").select_option("2")
         assert "Not compared" in shown.locator("#tested").inner_text()
         shown.locator("#run-b").select_option("1")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass
 from importlib import resources
-from itertools import combinations
+from itertools import permutations
 from typing import Any
 
 import jinja2
@@ -196,15 +196,15 @@ def _spread(row: dict[Hashable, Any]) -> tuple[float, float] | None:
     return None if math.isnan(spread[0]) else (spread[0], spread[1])
 
 
-def _comparisons(runs: Sequence[PageRun]) -> dict[str, list[str]]:
-    """Compare all pairs of runs, by their indices: in words, the first one as A and as B."""
+def _comparisons(runs: Sequence[PageRun]) -> dict[str, str]:
+    """Compare each run as A with each other one as B, in words, by their indices."""
     lines = {}
-    for (i, one), (j, other) in combinations(enumerate(runs), 2):
+    for (i, one), (j, other) in permutations(enumerate(runs), 2):
         try:
             found = compare(one.episodes, other.episodes, (one.name, other.name))
-            lines[f"{i}-{j}"] = [line(found, "A", "B"), line(found, "B", "A")]
+            lines[f"{i}-{j}"] = line(found, "A", "B")
         except UserError as error:
-            lines[f"{i}-{j}"] = 2 * [f"Not compared: {error}"]
+            lines[f"{i}-{j}"] = f"Not compared: {error}"
     return lines
 
 

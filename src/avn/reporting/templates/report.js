@@ -113,8 +113,7 @@
         + `Both: ${count(1, 1)}. Neither: ${count(0, 0)}. Mean SPL of A less that of B over the `
         + `episodes: ${less < 0 ? "\u2212" : "+"}${Math.abs(less).toFixed(1)} points.`
       : "These runs have no episode in common: other apartments, sounds, seeds or starts.";
-    const lines = data.comparisons[`${Math.min(one, other)}-${Math.max(one, other)}`];
-    at("tested").textContent = lines ? lines[one < other ? 0 : 1] : "";
+    at("tested").textContent = data.comparisons[`${one}-${other}`] ?? "";
     show_pairs();
   }
 
