@@ -49,6 +49,19 @@ def test_each_pair_of_three_has_a_table(outputs, capsys):
     assert "only B in 0; p = 1.0000" in " ".join(out.split())
 
 
+def test_several_networks_have_a_column_and_a_single_one_is_named(outputs, capsys):
+    for network in (1, 2):
+        walked = records("ours", 0, draw=network, rate=0.8)
+        write_run(outputs, walked, train_seed=network, code=f"eeeeeee{network}")
+    sides = ["bbbbbbb0,eeeeeee1,eeeeeee2", "aaaaaaa0"]
+    assert compare.main([*sides, "--outputs", str(outputs)]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert "sd between networks" in words
+    assert "One network of B: the result is of this network only." in words
+    assert "networks, apartments, sources and episodes resampled" in words
+    assert "McNemar's test needs one network of each side" in words
+
+
 def test_few_apartments_have_a_reason_instead_of_an_interval(outputs, capsys):
     assert compare.main(["cccccccc", "dddddddd", "--outputs", str(outputs)]) == 0
     words = " ".join(capsys.readouterr().out.split())

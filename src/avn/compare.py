@@ -83,6 +83,9 @@ def _print(one: Side, other: Side, differing: Sequence[str], found: Comparison) 
     each = " with each network" if found.networks > 1 else ""
     console.print(f"{found.episodes} episodes{each} in {apartments}", highlight=False)
     console.print(comparison_table.comparison_table(found))
+    for letter, side in (("A", one), ("B", other)):
+        if found.networks > 1 and len(side.networks) == 1:
+            console.print(f"One network of {letter}: the result is of this network only.")
     console.print(comparison_table.mcnemar_line(found), highlight=False, markup=False)
     console.print()
 

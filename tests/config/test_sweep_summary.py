@@ -17,7 +17,7 @@ def job(tmp_path):
         code = f"{len(list(tmp_path.rglob('results.csv'))):08d}"
         folder = write_run(tmp_path, records(agent, seed, draw=train_seed, **options), code=code)
         told = {"folder": str(folder), "outputs": str(tmp_path), "note": "", "error": None}
-        return told | {"setting": f"agent={agent}", "train_seed": train_seed}
+        return told | {"setting": f"agent={agent}, split=var", "train_seed": train_seed}
 
     return written
 
@@ -54,7 +54,9 @@ def test_settings_are_compared_with_the_first(capsys, job):
 
 def test_where_a_job_failed_each_network_is_a_setting(capsys, job):
     out, table = summary(capsys, [job("ours", 0, 0), job("ours", 1, 0), job("ours", 0, 1)])
-    assert set(table["setting"]) == {"agent=ours, train_seed=0", "agent=ours, train_seed=1"}
+    assert set(table["setting"]) == {
+        f"agent=ours, split=var, train_seed={network}" for network in (0, 1)
+    }
     assert any("not compared, seeds differ" in line for line in out)
     assert set(table["networks"]) == {1}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +113,8 @@ def _metric(row: Mapping[Any, Any], metric: str) -> str:
 
 def _compare(episodes: Mapping[str, pd.DataFrame]) -> None:
     """Print the difference of each setting to the first one, over the same episodes."""
-    (first, base), *others = ((key or "defaults", own) for key, own in episodes.items())
+    names = _short_names(list(episodes))
+    (first, base), *others = zip(names, episodes.values(), strict=True)
     tested = False
     for setting, own in others:
         try:
@@ -125,3 +126,10 @@ def _compare(episodes: Mapping[str, pd.DataFrame]) -> None:
         log(line(found, setting, first))
     if tested:
         log(f"{INDEPENDENT}.")
+
+
+def _short_names(settings: Sequence[str]) -> list[str]:
+    """Return settings without the overrides that all of them have."""
+    parts = [setting.split(", ") for setting in settings]
+    shared = set(parts[0]).intersection(*parts)
+    return [", ".join(own for own in each if own not in shared) or "defaults" for each in parts]
