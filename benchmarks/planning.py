@@ -1,6 +1,6 @@
 """Speed of the planner against networkx and scipy, called once for each episode and step.
 
-All plan on the same partial graphs, those of `ours_noexp` in a hand-drawn flat, and must find paths
+All plan on the same partial graphs, those of `plan_noexp` in a hand-drawn flat, and must find paths
 of the same cost. The planner is a compiled A* search that stops at the target and also plans where
 no path leads there; networkx is a bidirectional Dijkstra search in plain Python, which stops too;
 scipy is a compiled Dijkstra search, which has no target and finds the paths to all nodes. A peer
@@ -132,7 +132,7 @@ def main() -> None:
     scene = draw("flat", FLAT)
     observed = senses(scene)
     episodes = exhaustive_episodes(scene, ["ring"], VAR, seed=0)
-    agent, labels = PlannerAgent(OccupancyMapper(41)), Labels("ours_noexp", "resonance")
+    agent, labels = PlannerAgent(OccupancyMapper(41)), Labels("plan_noexp", "resonance")
     rollout_scene(agent, scene, episodes, VAR, labels, observed)  # compiles
     planner_agent.first_actions = timed = Timed()
     rollout_scene(agent, scene, episodes, VAR, labels, observed)
@@ -150,7 +150,7 @@ def main() -> None:
     frame = rollout_scene(agent, scene, episodes, VAR, labels, observed)
     summarise(frame)
     seconds = (time.perf_counter() - start) * 1500 / len(frame)
-    print(f"1,500 episodes of ours_noexp with figures: {seconds:.1f} s, one thread")
+    print(f"1,500 episodes of plan_noexp with figures: {seconds:.1f} s, one thread")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"peak memory: {peak:.0f} MB")
 

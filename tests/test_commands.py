@@ -273,7 +273,7 @@ def test_a_key_of_a_value_is_named(command, tmp_path):
 
 
 def test_an_option_that_has_moved_is_named_with_its_new_name(command, tmp_path):
-    options = ("agent=ours_noexp", f"outputs={tmp_path}", "mapper.network.epochs=1")
+    options = ("agent=plan_noexp", f"outputs={tmp_path}", "mapper.network.epochs=1")
     code, _, err = command("eval", *options)
     assert code == 2
     assert err == ["avn.eval: mapper.network.epochs: is now occupancy_model.epochs; give that"]

@@ -66,23 +66,23 @@ def test_an_option_on_top_of_one_of_ours_keeps_its_settings(own, monkeypatch, ca
 
 
 def test_an_occupancy_network(run):
-    sure = run("eval", "agent=ours_noexp", "occupancy_model=patient")
+    sure = run("eval", "agent=plan_noexp", "occupancy_model=patient")
     unsure = run(
-        "eval", "agent=ours_noexp", "occupancy_model=patient", "occupancy_model.temperature=9.0"
+        "eval", "agent=plan_noexp", "occupancy_model=patient", "occupancy_model.temperature=9.0"
     )
     assert sure != unsure
 
 
 def test_a_mapper(run):
     one, other = (
-        run("eval", "agent=ours_noexp", "mapper=forgetful", "occupancy_model=small", more)
+        run("eval", "agent=plan_noexp", "mapper=forgetful", "occupancy_model=small", more)
         for more in ("mapper.after=1", "mapper.after=500")
     )
     assert not episodes(one).equals(episodes(other))
 
 
 def test_a_planner(run):
-    found = episodes(run("eval", "agent=ours_noexp", "planner=lazy", "planner.rest=6"))
+    found = episodes(run("eval", "agent=plan_noexp", "planner=lazy", "planner.rest=6"))
     assert (found["actions"] - found["path_length"] >= 6).all()
 
 
@@ -132,7 +132,7 @@ def test_a_protocol(run):
 
 
 def test_a_renderer(run, outputs):
-    folder = run("eval", "agent=ours_noexp", "renderer=stripes", "renderer.period=2")
+    folder = run("eval", "agent=plan_noexp", "renderer=stripes", "renderer.period=2")
     assert (folder / "results.csv").is_file()
     assert list(outputs.glob("generate/room_1-*/views-stripes-*.h5"))
 

@@ -13,7 +13,7 @@ from avn import figures
 
 
 def made(command, outputs, agent):
-    eyes = EYES if agent == "ours_noexp" else ()
+    eyes = EYES if agent == "plan_noexp" else ()
     settings = fitting(f"agent={agent}", *SMALL, *eyes)
     code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}")
     assert code == 0, err
@@ -22,7 +22,7 @@ def made(command, outputs, agent):
 
 def test_pictures_lie_in_the_run_and_in_tensorboard(command, outputs, capfd):
     ours, memory, greedy = (
-        made(command, outputs, agent) for agent in ("ours_noexp", "ours_exp", "greedy")
+        made(command, outputs, agent) for agent in ("plan_noexp", "plan_exp", "greedy")
     )
     assert figures.main([ours, greedy, "--count", "1"]) == 0
     names = {path.name.split("-")[0].removesuffix(".png") for path in pictures(ours)}
@@ -52,10 +52,10 @@ def pictures(folder: str) -> list[Path]:
 
 
 def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(command, outputs):
-    ours, greedy = (made(command, outputs, agent) for agent in ("ours_noexp", "greedy"))
+    ours, greedy = (made(command, outputs, agent) for agent in ("plan_noexp", "greedy"))
     assert figures.main([greedy, "--count", "1"]) == 0
     found = EventMultiplexer().AddRunsFromDirectory(str(outputs)).Reload()
-    for folder, agent in ((ours, "ours_noexp"), (greedy, "greedy")):
+    for folder, agent in ((ours, "plan_noexp"), (greedy, "greedy")):
         run = str(Path(folder).relative_to(outputs))
         settings, metrics = hparams(found, run)
         assert settings["agent"].string_value == agent
@@ -70,7 +70,7 @@ def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(com
         assert steps == sorted(steps)
         assert len(steps) > 2
         assert not [tag for tag in found.Runs()[run]["scalars"] if tag.count("/") == 2]
-        assert (settings["with_localisation"].string_value != "") == (agent == "ours_exp")
+        assert (settings["with_localisation"].string_value != "") == (agent == "plan_exp")
     first = (list(settings), metrics)
     drawn = found.Runs()[str(Path(greedy).relative_to(outputs))]["images"]
     assert any(tag.startswith("figures/") for tag in drawn)

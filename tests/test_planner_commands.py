@@ -28,22 +28,22 @@ def records(out):
 
 @pytest.mark.parametrize("protocol", ["var", "stop"])
 def test_it_sees_hears_maps_and_walks(command, outputs, protocol):
-    code, out, err = ours(command, outputs, "agent=ours_noexp", f"protocol={protocol}")
+    code, out, err = ours(command, outputs, "agent=plan_noexp", f"protocol={protocol}")
     assert code == 0, err
     episodes = records(out)
     assert set(episodes["look"]) == {"once"}
-    assert set(episodes["agent"]) == {"ours_noexp"}
+    assert set(episodes["agent"]) == {"plan_noexp"}
     if protocol == "stop":
         # Whatever its network is worth after one epoch: who did not say Stop ran out of actions.
         assert set(episodes["outcome"]) <= {"success", "stopped_elsewhere", "out_of_actions"}
 
 
 def test_a_run_made_again_has_the_same_bytes(command, outputs):
-    _, out, _ = ours(command, outputs, "agent=ours_noexp")
+    _, out, _ = ours(command, outputs, "agent=plan_noexp")
     first = (Path(out[-1]) / "episodes.csv").read_bytes()
     for name in ("episodes.csv", "results.csv"):
         (Path(out[-1]) / name).unlink()
-    _, out, _ = ours(command, outputs, "agent=ours_noexp")
+    _, out, _ = ours(command, outputs, "agent=plan_noexp")
     assert (Path(out[-1]) / "episodes.csv").read_bytes() == first
 
 
@@ -51,7 +51,7 @@ def test_a_run_made_again_has_the_same_bytes(command, outputs):
 @pytest.mark.parametrize("exploration", ["shared", "own"])
 def test_it_explores_and_finds_itself(command, outputs, localisation, exploration):
     options = (f"localisation={localisation}", f"exploration={exploration}")
-    code, out, err = ours(command, outputs, "agent=ours_exp", *options)
+    code, out, err = ours(command, outputs, "agent=plan_exp", *options)
     assert code == 0, err
     assert len(records(out)) == 2 * 4
     places = pd.read_csv(Path(out[-1]) / "localisation.csv").groupby("cells")["error_m"].mean()
@@ -60,7 +60,7 @@ def test_it_explores_and_finds_itself(command, outputs, localisation, exploratio
 
 
 def test_what_its_networks_tell_it_is_judged_beside_its_records(command, outputs):
-    _, out, _ = ours(command, outputs, "agent=ours_noexp")
+    _, out, _ = ours(command, outputs, "agent=plan_noexp")
     seen = pd.read_csv(Path(out[-1]) / "local_patches.csv")
     room = seen[seen["cells"] == "visible"].set_index(["scene", "by"])["auc"]
     assert room["all", "network"] > 0.5
@@ -73,47 +73,47 @@ def test_what_its_networks_tell_it_is_judged_beside_its_records(command, outputs
 
 def test_the_truth_in_place_of_a_part_makes_a_bound_of_it(command, outputs):
     refused, _, err = ours(
-        command, outputs, "agent=ours_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"
+        command, outputs, "agent=plan_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"
     )
     assert refused == 2
     assert "agent.privileged: False, but 'PlannerAgent' is shown the truth" in err[-1]
     code, out, err = ours(
         command,
         outputs,
-        "agent=ours_noexp",
+        "agent=plan_noexp",
         "agent.oracle_inputs=[source_estimate,local_patch]",
         "agent.privileged=true",
     )
     assert code == 0, err
     episodes = records(out)
-    assert set(episodes["agent"]) == {"ours_noexp-true-source_estimate-true-local_patch"}
+    assert set(episodes["agent"]) == {"plan_noexp-true-source_estimate-true-local_patch"}
     assert episodes["success"].mean() > 0.8
     # what was given is no network's, so that there is nothing to judge
     assert not list(Path(out[-1]).glob("[hw]*.csv"))
 
 
 def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
-    _, out, _ = ours(command, outputs, "agent=ours_noexp", "subset=validation")
+    _, out, _ = ours(command, outputs, "agent=plan_noexp", "subset=validation")
     assert set(records(out)["scene"]) == {"val_1"}
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("agent=ours_noexp", "mapper=none"), "mapper: 'none' remembers nothing to plan on"),
-        (("agent=ours_noexp", "look=twice"), "look: 'twice' is none of once, around"),
-        (("agent=ours_noexp", "subset=all"), "subset: 'all' is none of train, validation, test"),
-        (("agent=ours_noexp", "baseline=greedy"), "cannot both act"),
+        (("agent=plan_noexp", "mapper=none"), "mapper: 'none' remembers nothing to plan on"),
+        (("agent=plan_noexp", "look=twice"), "look: 'twice' is none of once, around"),
+        (("agent=plan_noexp", "subset=all"), "subset: 'all' is none of train, validation, test"),
+        (("agent=plan_noexp", "baseline=greedy"), "cannot both act"),
         (
             ("agent=greedy", "agent.oracle_inputs=[map]"),
             "agent.oracle_inputs: only agents that plan",
         ),
-        (("agent=ours_exp", "localisation=gps"), "localisation: 'gps' is none of retrieval"),
-        (("agent=ours_exp", "episodes=exhaustive"), "have no exploration walk"),
-        (("agent=ours_exp", "exploration=some"), "exploration: 'some' is none of shared, own"),
-        (("agent=ours_exp", "mapper.local_patches=true"), "needs the observation 'local_patch'"),
+        (("agent=plan_exp", "localisation=gps"), "localisation: 'gps' is none of retrieval"),
+        (("agent=plan_exp", "episodes=exhaustive"), "have no exploration walk"),
+        (("agent=plan_exp", "exploration=some"), "exploration: 'some' is none of shared, own"),
+        (("agent=plan_exp", "mapper.local_patches=true"), "needs the observation 'local_patch'"),
         (
-            ("agent=ours_noexp", "planner.source_filter=last"),
+            ("agent=plan_noexp", "planner.source_filter=last"),
             "planner.source_filter: 'last' is none of latest",
         ),
     ],
@@ -127,20 +127,20 @@ def test_a_mistake_is_one_line(command, outputs, options, said):
 
 
 def test_views_that_are_missing_are_refused_with_auto_false(command, tmp_path):
-    settings = fitting("agent=ours_exp", *WORLD)
-    code, _, err = command("eval", *settings, "agent=ours_exp", f"outputs={tmp_path}", "auto=false")
+    settings = fitting("agent=plan_exp", *WORLD)
+    code, _, err = command("eval", *settings, "agent=plan_exp", f"outputs={tmp_path}", "auto=false")
     assert code == 2
     assert "is missing and auto=false" in err[-1]
 
 
 def test_damaged_features_are_one_line(command, outputs):
-    ours(command, outputs, "agent=ours_exp")
+    ours(command, outputs, "agent=plan_exp")
     path = next(outputs.glob("generate/room_1-*/features-*.h5"))
     whole = path.read_bytes()
     try:
         with h5py.File(path, "r+") as file:
             file["features"][0, 0] += 1
-        code, _, err = ours(command, outputs, "agent=ours_exp", "seed=5")
+        code, _, err = ours(command, outputs, "agent=plan_exp", "seed=5")
         assert code == 2
         assert f"{path}: changed since it was written" in err[-1]
     finally:

@@ -23,7 +23,7 @@ def browser():
 
 
 def made(command, outputs, agent, *more):
-    eyes = EYES if agent == "ours_noexp" else ()
+    eyes = EYES if agent == "plan_noexp" else ()
     settings = fitting(f"agent={agent}", *SMALL, *eyes)
     code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}", *more)
     assert code == 0, err
@@ -40,7 +40,7 @@ def page(command, outputs, capfd):
     return path
 
 
-AGENTS = ("ours_noexp", "ours_exp", "greedy")
+AGENTS = ("plan_noexp", "plan_exp", "greedy")
 
 
 def column(opened_page, index):
@@ -139,7 +139,7 @@ def test_two_runs_have_an_interval_a_test_and_the_smallest_difference(browser, t
 
 
 def test_a_cell_opens_its_episodes_and_an_episode_plays(browser, page, command, outputs):
-    episodes = pd.read_csv(made(command, outputs, "ours_noexp") / "episodes.csv")
+    episodes = pd.read_csv(made(command, outputs, "plan_noexp") / "episodes.csv")
     with opened(browser, page) as shown:
         shown.locator("td.cell[data-run='0'][data-sound=clock][data-scene=room_1]").click()
         rows = shown.locator("#episode-list tbody tr")
@@ -182,7 +182,7 @@ def test_the_same_episode_of_other_runs_stands_beside(browser, page):
             assert button.inner_text().startswith(f"{agent}: ")
             assert button.get_attribute("aria-pressed") == "true"
             titles.add(shown.locator("#episode-title").inner_text())
-            assert shown.locator("circle.entry").count() == (3 if agent == "ours_exp" else 0)
+            assert shown.locator("circle.entry").count() == (3 if agent == "plan_exp" else 0)
             assert shown.locator("#belief").is_visible() == (agent != "greedy")
         assert len(titles) == 1
         assert shown.locator("#differences tbody tr").count() == 2

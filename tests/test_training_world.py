@@ -9,7 +9,7 @@ from small import EYES, SMALL, fitting
 from avn.acoustics.dry_sounds import read_sound
 from avn.apartments.generator import generate
 
-ROW = "agent=ours_noexp"
+ROW = "agent=plan_noexp"
 
 
 @pytest.fixture(scope="module")

@@ -12,14 +12,14 @@ from avn.config.folder import conf_folder
     ("overrides", "network", "epochs"),
     [
         (["agent=greedy"], "none", None),
-        (["agent=ours_noexp"], "small", 5),
-        (["agent=ours_noexp", "mapper=occupancy_released"], "released", 30),
-        (["agent=ours_noexp", "occupancy_model=released"], "released", 30),
-        (["agent=ours_noexp", "occupancy_model.epochs=2"], "small", 2),
-        (["agent=ours_exp"], "none", None),
-        (["agent=ours_exp", "occupancy_model=small", "mapper.local_patches=true"], "small", 5),
+        (["agent=plan_noexp"], "small", 5),
+        (["agent=plan_noexp", "mapper=occupancy_released"], "released", 30),
+        (["agent=plan_noexp", "occupancy_model=released"], "released", 30),
+        (["agent=plan_noexp", "occupancy_model.epochs=2"], "small", 2),
+        (["agent=plan_exp"], "none", None),
+        (["agent=plan_exp", "occupancy_model=small", "mapper.local_patches=true"], "small", 5),
         (["agent=a3c_va", "mapper=occupancy"], "small", 5),
-        (["agent=ours_noexp", "mapper=none"], "none", None),
+        (["agent=plan_noexp", "mapper=none"], "none", None),
     ],
 )
 def test_which_network_sees_free_cells(overrides, network, epochs):

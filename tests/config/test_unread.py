@@ -23,11 +23,11 @@ def missing_error(command, *arguments):
         (("agent=greedy", "renderer=cycles"), "renderer"),
         (("agent=greedy", "backbone.size=64"), "backbone.size"),
         (("agent=greedy", "protocol.radius=2"), "protocol.radius"),
-        (("agent=ours_noexp", "algorithm.total_steps=5"), "algorithm.total_steps"),
-        (("agent=ours_noexp", "planner.error.sigma=2"), "planner.error.sigma"),
-        (("agent=ours_noexp", "stop_model.epochs=2"), "stop_model.epochs"),
-        (("agent=ours_noexp", "localisation=retrieval"), "localisation"),
-        (("agent=ours_noexp", "agent.oracle_inputs=[source_estimate]", "agent.privileged=true",
+        (("agent=plan_noexp", "algorithm.total_steps=5"), "algorithm.total_steps"),
+        (("agent=plan_noexp", "planner.error.sigma=2"), "planner.error.sigma"),
+        (("agent=plan_noexp", "stop_model.epochs=2"), "stop_model.epochs"),
+        (("agent=plan_noexp", "localisation=retrieval"), "localisation"),
+        (("agent=plan_noexp", "agent.oracle_inputs=[source_estimate]", "agent.privileged=true",
           "sound_model=released"), "sound_model"),
         (("agent=a3c_va", "mapper=spatial_memory"), "mapper"),
         (("agent=a3c_va_mapper", "mapper=spatial_memory", "occupancy_model=small"), "mapper"),
@@ -90,7 +90,7 @@ def test_so_do_the_other_commands(command, tmp_path, arguments, key):
         ("agent=random_walk", "acoustics=diffraction"),  # a column of the records
         ("agent=random_walk", "sound=alarm"),
         ("agent=oracle", "protocol=stop", "protocol.radius=2"),
-        ("agent=ours_noexp", "mapper.visible_above=0.3"),
+        ("agent=plan_noexp", "mapper.visible_above=0.3"),
         ("agent=greedy", "film=1", "renderer.camera.size=32"),  # which films show
     ],
 )
@@ -102,7 +102,7 @@ def test_what_is_read_or_changes_nothing_is_taken(command, outputs, arguments):
 
 def test_a_table_takes_what_one_of_its_rows_reads(command, tmp_path):
     options = ("split=mini", "planner.collision_cost=3", "auto=false", f"outputs={tmp_path}/o")
-    line = missing_error(command, "reproduce", "rows=random_walk,ours_noexp", *options)
+    line = missing_error(command, "reproduce", "rows=random_walk,plan_noexp", *options)
     assert "is missing and auto=false" in line
 
 

@@ -59,6 +59,54 @@ def test_by_retrieval_it_is_where_it_saw_the_picture(step):
     assert set(believed(mapper)) == {(0, 0), (1, 0), (1, 1), (0, 1)}
 
 
+def test_a_memory_that_does_not_grow_keeps_to_the_places_of_the_walk():
+    mapper = begun(localisation="retrieval", grows=False, heading="nearest", top=3)
+    cost, walls = mapper.graph.cost.copy(), mapper.graph.walls.copy()
+    # like the first, the second and the last picture, in this order: east, east, west
+    picture = torch.nn.functional.normalize(torch.tensor([3.0, 2, 0, 0, 0, 1]), dim=0)
+    for _ in range(2):  # a second look finds no entry of its own
+        look(mapper, picture)
+        mean = torch.tensor([(0 + 1 + 0) / 3, (0 + 0 + 1) / 3], dtype=torch.float64)
+        assert torch.allclose(mapper.location[0], mean + CENTRE)
+        assert (mapper.pose[0] - torch.tensor([CENTRE, CENTRE, 0])).tolist() == [0, 0, EAST]
+    assert (mapper.graph.cost == cost).all()
+    assert (mapper.graph.walls == walls).all()
+
+
+def test_between_places_of_the_walk_it_is_at_the_nearest_one():
+    far = [(0, 0, NORTH), (0, 1, NORTH), (0, 2, NORTH), (0, 3, NORTH), (0, 4, NORTH)]
+    mapper = MemoryMapper(SIZE, localisation="retrieval", grows=False, top=2)
+    mapper.reset(1, GraphRules())
+    # two pictures of the walk, at (0, 0) and (4, 0), and places between them that it did not visit
+    walk = [*far, *[(x, 4, EAST) for x in range(5)], *[(4, y, SOUTH) for y in range(3, -1, -1)]]
+    mapper.explore(walk_of(walk), torch.zeros(1, dtype=torch.int64))
+    look(
+        mapper,
+        torch.nn.functional.normalize(torch.eye(len(walk))[0] + torch.eye(len(walk))[-1], dim=0),
+    )
+    assert (mapper.location[0] - CENTRE).tolist() == [2.0, 0.0]
+    assert (mapper.pose[0, :2] - CENTRE).tolist() == [0, 0]  # the first of those equally near
+
+
+def test_only_visited_squares_are_nodes_above_the_probability_of_unknown_ones():
+    mapper = MemoryMapper(SIZE, localisation="retrieval", grows=False)
+    mapper.reset(1, GraphRules(obstacle_threshold=0.6))
+    mapper.explore(walk_of(ROUND), torch.zeros(1, dtype=torch.int64))
+    rows, columns = (mapper.graph.cost[0] < float("inf")).nonzero()
+    places = set(zip((columns - CENTRE).tolist(), (rows - CENTRE).tolist(), strict=True))
+    assert places == {(0, 0), (1, 0), (1, 1), (0, 1)}
+
+
+def test_the_heading_is_the_most_frequent_one_or_the_nearest_one_s():
+    picture = torch.nn.functional.normalize(torch.tensor([0, 0, 3.0, 0, 2.0, 1.9]), dim=0)
+    for heading, expected in (("vote", WEST), ("nearest", NORTH)):
+        mapper = begun(localisation="retrieval", heading=heading, top=3)
+        look(mapper, picture)
+        assert int(mapper.pose[0, 2]) == expected
+    with pytest.raises(UserError, match=r"mapper.heading: 'mean'; give vote or nearest"):
+        begun(heading="mean")
+
+
 @pytest.mark.parametrize(("edges", "joined"), [("consecutive", False), ("adjacent", True)])
 def test_edges_are_where_the_walk_went_or_between_all_neighbours(edges, joined):
     walls = begun(localisation="retrieval", edges=edges).graph.walls[0]

@@ -144,25 +144,6 @@ def test_every_recipe_key_reaches_the_model() -> None:
     assert set(model.hparams) - {"camera"} == set(node) - {"_target_", "ckpt_path"}
 
 
-def test_released_sizes() -> None:
-    model = build_object("occupancy_model", option("occupancy_model", "released"))
-    convolutions = [layer for layer in model.net.modules() if isinstance(layer, torch.nn.Conv2d)]
-    sizes = [(layer.out_channels, layer.kernel_size[0]) for layer in convolutions]
-    assert sizes == [(32, 7), (48, 7), (64, 5), (64, 5)]
-    transposed = [
-        layer for layer in model.net.modules() if isinstance(layer, torch.nn.ConvTranspose2d)
-    ]
-    assert [(layer.out_channels, layer.kernel_size[0]) for layer in transposed] == [
-        (64, 7),
-        (32, 7),
-        (1, 7),
-    ]
-    dense = [layer for layer in model.net.modules() if isinstance(layer, torch.nn.Linear)]
-    assert [layer.out_features for layer in dense] == [200, 4096, 1000, 50]
-    views = torch.zeros(2, 128, 128, 3, dtype=torch.uint8)
-    assert model.eval()(views).shape == (2, 2, 5, 5)
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -23,7 +23,7 @@ def sounds(*overrides):
     return paper_sounds(cfg, default_config(cfg))
 
 
-@pytest.mark.parametrize("agent", ["random_walk", "greedy", "a3c_v", "ours_noexp", "ours_exp"])
+@pytest.mark.parametrize("agent", ["random_walk", "greedy", "a3c_v", "plan_noexp", "plan_exp"])
 def test_the_default_settings_are_the_benchmark_whatever_the_seeds(agent):
     assert sounds(f"agent={agent}") == WHOLE
     assert sounds(f"agent={agent}", "seed=3", "train_seed=2", "film=4", "processes=1") == WHOLE
@@ -70,7 +70,7 @@ def test_a_change_that_the_agent_reads_leaves_the_benchmark(override, tmp_path):
 
         shutil.copytree(FROZEN / "var", tmp_path / "my_flat")
         override = f"split.folder={tmp_path}/my_flat"
-    assert sounds("agent=ours_noexp", *override.split()) == frozenset()
+    assert sounds("agent=plan_noexp", *override.split()) == frozenset()
 
 
 def test_a_change_that_the_agent_does_not_read_is_none():
@@ -130,7 +130,7 @@ def test_results_of_mini_say_that_they_mean_nothing():
 
 
 def test_what_was_changed_is_listed_once():
-    cfg = composed("agent=ours_noexp", "acoustics.rays=300", "planner.collision_cost=9")
+    cfg = composed("agent=plan_noexp", "acoustics.rays=300", "planner.collision_cost=9")
     assert changed_settings(cfg, default_config(cfg)) == {
         "acoustics.rays": "300",
         "planner.collision_cost": "9.0",

@@ -23,7 +23,7 @@ from avn.pipeline.stop_classifier import StopNetwork, StopProbabilities
 from avn.pipeline.views import RenderedViews
 from avn.pipeline.visual_features import VisualEmbeddings
 
-MINI = ("agent=ours_exp", "split=mini", "protocol=var_stop", "occupancy_model=small")
+MINI = ("agent=plan_exp", "split=mini", "protocol=var_stop", "occupancy_model=small")
 NONE = set()
 RUN = {"run"}
 # what listens, what it hears, and where
@@ -42,7 +42,7 @@ def products(*overrides):
     apartments = Apartments(cfg, "test")
     actor = composed("agent=a3c_va", "split=mini", *_fitting(overrides))
     mapping = composed("agent=a3c_va_mapper", "split=mini", *_fitting(overrides))
-    windows = composed("agent=ours_noexp", "split=mini", *_fitting(overrides))
+    windows = composed("agent=plan_noexp", "split=mini", *_fitting(overrides))
     return {
         "geometry": Geometry(cfg, apartments),
         "tail": LateReverberation(cfg, apartments),
@@ -199,14 +199,14 @@ def test_equal_worlds_share_their_sound_and_other_parts_share_no_views():
         (("agent=oracle", "episodes=exhaustive"), "protocol.num_starts=7"),
         (("agent=oracle", "episodes=exhaustive"), "protocol.exploration_steps=33"),
         (("agent=greedy",), "baseline.slack=0.9"),
-        (("agent=ours_exp", "localisation=retrieval"), "mapper.sharpness=0.5"),
-        (("agent=ours_exp", "localisation=retrieval"), "mapper.confidence=0.9"),
+        (("agent=plan_exp", "localisation=retrieval"), "mapper.sharpness=0.5"),
+        (("agent=plan_exp", "localisation=retrieval"), "mapper.confidence=0.9"),
         (
-            ("agent=ours_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
+            ("agent=plan_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
             "realisations=2",
         ),
         (
-            ("agent=ours_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
+            ("agent=plan_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
             "renderer.camera.size=64",
         ),
         (("agent=a3c_va",), "baseline.top=1"),
@@ -223,12 +223,12 @@ def test_what_makes_no_difference_to_a_run_makes_none_anew(row, override):
     [
         (("agent=oracle",), "protocol.num_starts=7"),
         (("agent=greedy", "protocol=stop"), "baseline.slack=0.9"),
-        (("agent=ours_exp",), "mapper.sharpness=0.5"),
-        (("agent=ours_exp", "planner.source_filter=bayes"), "planner.error.sigma=0.9"),
-        (("agent=ours_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
+        (("agent=plan_exp",), "mapper.sharpness=0.5"),
+        (("agent=plan_exp", "planner.source_filter=bayes"), "planner.error.sigma=0.9"),
+        (("agent=plan_noexp", "agent.oracle_inputs=[source_estimate,local_patch]"),
          "renderer.camera.pitch=-20"),
-        (("agent=ours_noexp",), "mapper.visible_above=0.3"),
-        (("agent=ours_exp", "mapper.local_patches=true", "occupancy_model=small"),
+        (("agent=plan_noexp",), "mapper.visible_above=0.3"),
+        (("agent=plan_exp", "mapper.local_patches=true", "occupancy_model=small"),
          "mapper.visible_above=0.3"),
         (("agent=a3c_va",), "baseline.samples=false"),
     ],
@@ -285,10 +285,10 @@ def test_a_network_of_the_default_trainer_is_the_one_of_old():
 
 @pytest.mark.parametrize("kind", [SoundNetwork, StopNetwork])
 def test_the_acoustics_of_the_training_world_are_read_where_they_follow_the_test(kind):
-    read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini")).read()
+    read = kind(composed("agent=plan_noexp", "stop_model=cnn5", "split=mini")).read()
     assert {"acoustics.name", "acoustics.direct_path", "acoustics.rays", "split.folder"} <= read
     own = "+acoustics@training.acoustics=resonance"
-    read = kind(composed("agent=ours_noexp", "stop_model=cnn5", "split=mini", own)).read()
+    read = kind(composed("agent=plan_noexp", "stop_model=cnn5", "split=mini", own)).read()
     assert not any(key.startswith("acoustics.") for key in read)
 
 
@@ -296,25 +296,25 @@ def test_the_acoustics_of_the_training_world_are_read_where_they_follow_the_test
     ("overrides", "line"),
     [
         (("agent=a3c_va_m", "episodes=exhaustive"), "have no exploration walk"),
-        (("agent=ours_exp", "protocol.exploration_steps=0"), "have no exploration walk"),
+        (("agent=plan_exp", "protocol.exploration_steps=0"), "have no exploration walk"),
         (
-            ("agent=ours_noexp", "agent.oracle_inputs=[pose]", "agent.privileged=true"),
+            ("agent=plan_noexp", "agent.oracle_inputs=[pose]", "agent.privileged=true"),
             "'pose' is nothing",
         ),
         (
-            ("agent=ours_exp", "agent.oracle_inputs=[map]", "agent.privileged=true"),
+            ("agent=plan_exp", "agent.oracle_inputs=[map]", "agent.privileged=true"),
             "'map' is nothing",
         ),
         (
-            ("agent=ours_exp", "agent.oracle_inputs=[local_patch]", "agent.privileged=true"),
+            ("agent=plan_exp", "agent.oracle_inputs=[local_patch]", "agent.privileged=true"),
             "'local_patch' is noth",
         ),
-        (("agent=ours_noexp", "mapper.size=100"), "mapper.size: 100; give an odd number"),
-        (("agent=ours_noexp", "protocol=stop", "stop_model.criterion=foo"), "stop_model.criterion"),
+        (("agent=plan_noexp", "mapper.size=100"), "mapper.size: 100; give an odd number"),
+        (("agent=plan_noexp", "protocol=stop", "stop_model.criterion=foo"), "stop_model.criterion"),
         (("agent=a3c_va_mapper", "baseline.map_width=20"), "baseline.map_width: 20"),
         (("agent=greedy", "sound_model.epochs=0"), "epochs"),
-        (("agent=ours_noexp", "sound_model.schedule=foo"), "schedule"),
-        (("agent=ours_noexp", "occupancy_model.appearances=0"), "occupancy_model.appearances: 0"),
+        (("agent=plan_noexp", "sound_model.schedule=foo"), "schedule"),
+        (("agent=plan_noexp", "occupancy_model.appearances=0"), "occupancy_model.appearances: 0"),
         (("agent=greedy", "realisations=0"), "realisations: 0 is out of range"),
         (("agent=greedy", "trainer.devices=2"), "trainer.devices: 2"),
         (("agent=greedy", "trainer.precision=half"), "trainer.precision: 'half'"),
@@ -337,7 +337,7 @@ def test_what_cannot_work_is_refused_before_anything_is_made(overrides, line, tm
 
 
 def test_a_radius_is_another_goal():
-    row = ("agent=ours_noexp", "protocol=stop", "split=mini")
+    row = ("agent=plan_noexp", "protocol=stop", "split=mini")
     one, other = (StopNetwork(composed(*row, f"protocol.radius={r}")) for r in (1, 2))
     assert one.fingerprint != other.fingerprint
 
@@ -351,7 +351,7 @@ def test_sounds_are_told_apart_by_their_order():
 
 
 def test_a_threshold_of_the_config_needs_no_network():
-    row = ("agent=ours_noexp", "protocol=var_stop", "split=mini")
+    row = ("agent=plan_noexp", "protocol=var_stop", "split=mini")
     given = Evaluation(composed(*row, "stop_model.threshold=0.7"))
     assert StopNetwork(given.cfg).threshold() == 0.7
     # the probabilities are those of the network all the same, but only if they are missing

@@ -35,7 +35,7 @@ def test_cells_that_are_not_visible_enough_tell_nothing():
             return [torch.stack((free, visible), dim=1)]
 
     for least, share in ((0.0, 1.0), (0.4, 0.6), (1.1, 0.0)):
-        cfg = composed("agent=ours_noexp", "split=mini", f"mapper.visible_above={least}")
+        cfg = composed("agent=plan_noexp", "split=mini", f"mapper.visible_above={least}")
         (trusted,) = Given(cfg, Apartments(cfg, "test")).trusted()
         told = ~trusted.isnan()
         assert torch.equal(told, visible >= least)

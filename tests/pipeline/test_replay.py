@@ -28,7 +28,7 @@ def open_run(folder):
 
 
 def made(command, outputs, agent, *more):
-    eyes = EYES if agent == "ours_noexp" or agent.endswith("mapper") else ()
+    eyes = EYES if agent == "plan_noexp" or agent.endswith("mapper") else ()
     eyes += A3C if agent.startswith("a3c") else ()
     settings = fitting(f"agent={agent}", *SMALL, *eyes)
     code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}", *more)
@@ -37,7 +37,7 @@ def made(command, outputs, agent, *more):
 
 
 @pytest.mark.parametrize(
-    "agent", ["random_walk", "greedy", "a3c_va_m_mapper", "ours_noexp", "ours_exp"]
+    "agent", ["random_walk", "greedy", "a3c_va_m_mapper", "plan_noexp", "plan_exp"]
 )
 def test_a_run_is_replayed_from_its_config(command, outputs, agent):
     folder = made(command, outputs, agent)
@@ -53,11 +53,11 @@ def test_a_run_is_replayed_from_its_config(command, outputs, agent):
         assert len(trace.action) == row["actions"]
     # what an actor-critic agent hears is a feature, no place, and its map is its own affair
     assert (traces[0].source_estimates is None) == (
-        agent not in ("greedy", "ours_noexp", "ours_exp")
+        agent not in ("greedy", "plan_noexp", "plan_exp")
     )
     assert (traces[0].beliefs is None) == (not agent.startswith("ours"))
     assert (traces[0].exploration_trajectory is None) == (
-        agent not in ("ours_exp", "a3c_va_m_mapper")
+        agent not in ("plan_exp", "a3c_va_m_mapper")
     )
 
 

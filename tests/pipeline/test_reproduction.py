@@ -9,7 +9,7 @@ from avn.pipeline.run import Evaluation
 from avn.pipeline.stage import make, missing
 from avn.pipeline.trained import METRICS
 
-ALL_ROWS = ("greedy", "a3c_va", "a3c_va_m_mapper", "ours_noexp")
+ALL_ROWS = ("greedy", "a3c_va", "a3c_va_m_mapper", "plan_noexp")
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_each_stage_is_named_once_and_before_what_needs_it(plan, tmp_path):
         "views of the train apartments of 'mini' (raycast, appearance 1)",
         "occupancy network 'small' (raycast, train_seed 0)",
         "agent 'a3c_va_m_mapper' (resonance, var, train_seed 0)",
-        "run of 'ours_noexp' (seed 1, train_seed 0)",
+        "run of 'plan_noexp' (seed 1, train_seed 0)",
     ]
     assert [found.index(name) for name in order] == sorted(found.index(name) for name in order)
     runs = [stage.cfg.agent.name for stage in planned if isinstance(stage, Evaluation)]
@@ -77,7 +77,7 @@ def test_a_row_without_ears_needs_no_sound_and_one_without_eyes_no_views(plan):
 
 
 def test_what_is_made_was_planned_and_then_nothing_is_missing(plan, capfd):
-    rows, options = ("ours_noexp", "a3c_va_mapper"), (*EYES, *A3C, "sound=alarm")
+    rows, options = ("plan_noexp", "a3c_va_mapper"), (*EYES, *A3C, "sound=alarm")
     stages = plan(*rows, options=options)
     capfd.readouterr()
     for stage in stages:
@@ -89,11 +89,11 @@ def test_what_is_made_was_planned_and_then_nothing_is_missing(plan, capfd):
 
 
 def test_what_a_present_stage_was_made_of_is_not_asked_for(plan):
-    (found,) = [stage for stage in plan("ours_noexp") if isinstance(stage, OccupancyNetwork)]
+    (found,) = [stage for stage in plan("plan_noexp") if isinstance(stage, OccupancyNetwork)]
     metrics = found.folder / METRICS
     metrics.parent.mkdir(parents=True)
     metrics.touch()
-    left = names(plan("ours_noexp"))
+    left = names(plan("plan_noexp"))
     assert not [name for name in left if "appearance 1" in name or "views of the train" in name]
 
 

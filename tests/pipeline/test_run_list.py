@@ -16,7 +16,7 @@ def runs(tmp_path):
     """Three runs, of which the last has a damaged config."""
     for agent, seed, sounds, rate in (
         ("greedy", 0, ("ring", "clock"), 0.25),
-        ("ours_exp", 1, ("ring",), 0.5),
+        ("plan_exp", 1, ("ring",), 0.5),
         ("broken", 2, ("ring",), 0.125),
     ):
         folder = tmp_path / "eval" / agent / "-".join(sounds) / f"seed{seed}-00000000"
@@ -43,7 +43,7 @@ def listed(capsys, *arguments):
 
 def test_each_finished_run_has_its_world_and_figures(runs, capsys):
     rows = listed(capsys, f"outputs={runs}", "format=json", "sort=seed")
-    assert [row["agent"] for row in rows] == ["greedy", "ours_exp", None]
+    assert [row["agent"] for row in rows] == ["greedy", "plan_exp", None]
     first = rows[0]
     assert (first["success"], first["spl"]) == (0.25, 0.125)
     assert (first["sound"], first["protocol"], first["split"]) == ("ring+clock", "stop", "mini")
@@ -55,7 +55,7 @@ def test_each_finished_run_has_its_world_and_figures(runs, capsys):
 def test_runs_are_filtered_and_sorted_by_column(runs, capsys):
     shared = (f"outputs={runs}", "format=json")
     assert [r["agent"] for r in listed(capsys, *shared, "agent=greedy")] == ["greedy"]
-    assert len(listed(capsys, *shared, "agent=greedy,ours_exp", "seed=0,1")) == 2
+    assert len(listed(capsys, *shared, "agent=greedy,plan_exp", "seed=0,1")) == 2
     assert listed(capsys, *shared, "agent=greedy", "seed=1") == []
     by = [row["success"] for row in listed(capsys, *shared, "sort=-spl")]
     assert by == [0.5, 0.25, 0.125]

@@ -32,10 +32,10 @@ def test_agents_are_enough_where_they_differ():
 def test_a_setting_is_named_where_it_is_read_and_not_that_of_the_row():
     assert names(
         "agent=greedy localisation=retrieval look=around",
-        "agent=ours_exp localisation=retrieval",
-        "agent=ours_exp",
-        "agent=ours_exp look=around",
-    ) == ["greedy", "ours_exp, localisation=retrieval", "ours_exp", "ours_exp, look=around"]
+        "agent=plan_exp localisation=retrieval",
+        "agent=plan_exp",
+        "agent=plan_exp look=around",
+    ) == ["greedy", "plan_exp, localisation=retrieval", "plan_exp", "plan_exp, look=around"]
 
 
 def test_an_option_stands_for_its_settings_and_a_change_for_itself():
@@ -67,9 +67,9 @@ def test_seeds_and_sounds_are_named_where_they_differ():
 
 
 def test_other_settings_are_named_where_nothing_else_tells_runs_apart():
-    assert names("agent=ours_noexp planner.collision_cost=9", "agent=ours_noexp") == [
-        "ours_noexp, planner.collision_cost=9.0",
-        "ours_noexp",
+    assert names("agent=plan_noexp planner.collision_cost=9", "agent=plan_noexp") == [
+        "plan_noexp, planner.collision_cost=9.0",
+        "plan_noexp",
     ]
     same = [run("agent=greedy", folder=name) for name in ("seed0-a", "seed0-b")]
     assert names_of(same) == ["greedy (seed0-a)", "greedy (seed0-b)"]

@@ -49,7 +49,7 @@ HEAVY = "{'torch', 'numpy', 'pandas', 'numba', 'scipy', 'lightning', 'matplotlib
     [
         ("eval", "agent=greddy"),
         ("eval", "agent=greedy protocol.max_step=5"),
-        ("eval", "agent=ours_exp planner.max_rotations=many"),
+        ("eval", "agent=plan_exp planner.max_rotations=many"),
         ("train", "model=sound_cmm"),
         ("train", "model=sound_cnn sound_model.epochs=ten"),
         ("generate", "split=mimi"),

@@ -52,7 +52,8 @@ class PlannerAgent(Agent):
     error : SourceErrorModel
         Error model of the source estimates, for "bayes".
     obstacle_threshold : float
-        Squares whose probability of being free is below this are no nodes, 0 to 0.5.
+        Squares whose probability of being free is below this are no nodes, 0 to 1. Above 0.5, for
+        agents that explore, unknown squares are none either.
     collision_cost : float
         Cost of a collision, moves, 0 to 1000: entering a square that is free with probability p
         costs 1 + `collision_cost` (1 - p).
@@ -104,6 +105,11 @@ class PlannerAgent(Agent):
             raise UserError(f"look: '{look}' is none of {', '.join(LOOKS)}")
         self.mapper, self.look, self.source_filter = mapper, look, source_filter
         self.rules = GraphRules(obstacle_threshold, collision_cost)
+        if obstacle_threshold > 0.5 and not mapper.explores:
+            raise UserError(
+                f"planner.obstacle_threshold: {obstacle_threshold}; give 0 to 0.5, for an unknown "
+                "square is believed to be free by 0.5 and must be a node where nothing was explored"
+            )
         self.error = error or SourceErrorModel()
         if max_rotations < 1:
             raise UserError(

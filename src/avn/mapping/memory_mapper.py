@@ -42,6 +42,13 @@ class MemoryMapper(Mapper):
     localisation : {"retrieval", "retrieval+odometry"}
         Source of the pose: the spatial memory alone, or odometry since the start, with the map of
         the exploration overlaid.
+    heading : {"vote", "nearest"}
+        Heading of an estimate of the pose: the most frequent one among the retrieved entries, or
+        that of the most similar entry.
+    grows : bool
+        True if memory and graph gain what the agent sees, visits and collides with after the
+        exploration. False, with "retrieval" alone: they stay as they are, and the agent is at the
+        node nearest to its estimated location.
     local_patches : bool
         True if the map integrates the local patches, in the exploration and afterwards.
     edges : {"consecutive", "adjacent"}
@@ -65,6 +72,8 @@ class MemoryMapper(Mapper):
         size: int = 101,
         top: int = 3,
         localisation: str = "retrieval+odometry",
+        heading: str = "vote",
+        grows: bool = True,
         local_patches: bool = False,
         edges: str = "consecutive",
         sharpness: float = 0.02,
@@ -72,6 +81,8 @@ class MemoryMapper(Mapper):
     ) -> None:
         if localisation not in LOCALISATIONS:
             raise UserError(f"localisation: '{localisation}' is none of {', '.join(LOCALISATIONS)}")
+        if heading not in ("vote", "nearest"):
+            raise UserError(f"mapper.heading: '{heading}'; give vote or nearest")
         if edges not in ("consecutive", "adjacent"):
             raise UserError(f"mapper.edges: '{edges}'; give consecutive or adjacent")
         if not (sharpness > 0 and confidence > 0):
@@ -79,13 +90,13 @@ class MemoryMapper(Mapper):
         self.size, self.top, self.localisation = size, top, localisation
         self.in_exploration_frame = localisation == "retrieval"
         self.edges, self.sharpness, self.confidence = edges, sharpness, confidence
-        self.local_patches = local_patches
+        self.heading, self.grows, self.local_patches = heading, grows, local_patches
         self.needs = ("visual_embedding", "local_patch") if local_patches else ("visual_embedding",)  # type: ignore[misc]
         self.ground_truths = () if self.in_exploration_frame else ("pose",)  # type: ignore[misc]
 
     def unused_settings(self) -> tuple[str, ...]:
-        """Return the settings of the votes for "retrieval". See `Mapper.unused_settings`."""
-        return ("sharpness", "confidence") if self.in_exploration_frame else ()
+        """Return the settings of the other localisation. See `Mapper.unused_settings`."""
+        return ("sharpness", "confidence") if self.in_exploration_frame else ("heading", "grows")
 
     def reset(self, n: int, rules: GraphRules) -> None:
         """Begin N new episodes. See `Mapper.reset`."""
@@ -153,7 +164,13 @@ class MemoryMapper(Mapper):
     ) -> None:
         similarity, poses = self.retrieved = memory.recall(observation["visual_embedding"])
         found = locate(similarity, poses)
+        if self.heading == "nearest":
+            found[:, 2] = poses[:, 0, 2]
         pose = found.round().long()
+        if not self.grows:
+            pose[:, :2] = memory.nearest(found[:, :2])
+            self._place(pose, found[:, :2])
+            return
         squares = update_map(self.map, pose, self._last, observation, direction, self.local_patches)
         self.graph.set(squares, torch.sigmoid(self.map.log_odds.flatten(1).gather(1, squares)))
         memory.add(observation["visual_embedding"], pose, similarity[:, 0] < 1 - 1e-4)

@@ -68,6 +68,26 @@ class SpatialMemory:
         self._own_values[chosen, self._own[chosen]] = poses[chosen]
         self._own[chosen] += 1
 
+    def nearest(self, location: Tensor) -> Tensor:
+        """Return the visited square nearest to each agent's location.
+
+        Parameters
+        ----------
+        location : (N, 2) float64 tensor
+            Squares to the right and to the front.
+
+        Returns
+        -------
+        (N, 2) int64 tensor
+            The first along the trajectory of those equally near.
+        """
+        places = self._values[self.trajectory_index, :, :2]
+        away = (places - location[:, None]).square().sum(dim=-1)
+        # rows of padding come last and have zeros as keys
+        empty = (self._keys[self.trajectory_index] == 0).all(dim=-1)
+        index = away.masked_fill(empty, torch.inf).argmin(dim=1)
+        return places[torch.arange(len(places)), index]
+
     def recall(self, features: Tensor, own: bool = True) -> tuple[Tensor, Tensor]:
         """Retrieve the entries most similar to the views of the agents.
 

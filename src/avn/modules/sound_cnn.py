@@ -11,7 +11,6 @@ from torchmetrics import MeanSquaredError
 
 from avn.core.errors import UserError
 from avn.modules.audio_network import AudioNetwork, PictureBatch
-from avn.modules.five_layer_cnn import FiveLayerCnn
 from avn.modules.network import SUBSETS
 from avn.modules.sound_metrics import LocationErrors
 
@@ -71,14 +70,15 @@ class SoundCnn(AudioNetwork):
         Raises
         ------
         UserError
-            Where `net` is no `FiveLayerCnn`.
+            Where `net` has no hidden layer, methods `hidden` and `answer`.
         """
-        if not isinstance(self.net, FiveLayerCnn):
-            raise UserError(f"sound_model.net: {type(self.net).__name__} gives no features")
+        net: Any = self.net
+        if not (hasattr(net, "hidden") and hasattr(net, "answer")):
+            raise UserError(f"sound_model.net: {type(net).__name__} gives no features")
         pictures = self.spectrogram(clips)
         both = torch.cat((pictures, self.spectrogram.mirror(pictures)))
-        hidden = self.net.hidden(both.contiguous(memory_format=torch.channels_last))
-        straight, mirrored = self.net.answer(hidden).chunk(2)
+        hidden = net.hidden(both.contiguous(memory_format=torch.channels_last))
+        straight, mirrored = net.answer(hidden).chunk(2)
         location = (straight + mirrored * mirrored.new_tensor(self.mirror_signs)) / 2
         return torch.cat((*hidden.chunk(2), location), dim=1)
 

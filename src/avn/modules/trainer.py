@@ -130,7 +130,7 @@ def build_trainer(
                 enable_model_summary=False,
                 log_every_n_steps=20,
                 deterministic=torch.cuda.is_available(),
-                # one process, also within a job of a batch system, whose tasks Lightning would count
+                # one process, also in a job of a batch system, whose tasks Lightning would count
                 plugins=LightningEnvironment(),
                 limit_train_batches=few,
                 limit_val_batches=few,

@@ -8,6 +8,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from avn.core.settings import plain
+from avn.modules.settings import SAME_WEIGHTS
 from avn.pipeline.apartments import TEST, TRAINING
 from avn.pipeline.run import Evaluation, agent_label
 from avn.pipeline.sounds import sound_files
@@ -19,7 +20,15 @@ from avn.reporting.world import sounds_text, trial_note
 # World of the paper: the direct sound passes through walls, as in its sound engine.
 PAPER_WORLD = {"split": "var", "protocol": "var", "acoustics": "resonance"}
 # Settings in which repetitions of a run differ, and those that change no record.
-NOT_COMPARED = ("seed", "train_seed", "film", "film_show", "film_speed", *MACHINE)
+NOT_COMPARED = (
+    *("seed", "train_seed", "film", "film_show", "film_speed", *MACHINE),
+    *(f"trainer.{key}" for key in SAME_WEIGHTS),
+)
+
+
+def compared(key: str) -> bool:
+    """Return whether runs that differ in a setting are compared by it."""
+    return key not in NOT_COMPARED and key.split(".")[0] != "logger"
 
 
 def changed_settings(cfg: DictConfig, default: DictConfig) -> dict[str, str]:
@@ -42,7 +51,7 @@ def changed_settings(cfg: DictConfig, default: DictConfig) -> dict[str, str]:
         TRAINING.sounds if key.startswith(f"{TRAINING.sounds}.") else key
         for key in Evaluation(cfg).read()
         if not key.startswith(f"{TEST.sounds}.")
-        and key not in NOT_COMPARED
+        and compared(key)
         and not key.endswith(".train_seed")
     }
     keys -= {key for key in keys if _follows(cfg, key, keys)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from avn.core.settings import plain
-from avn.pipeline.benchmark import NOT_COMPARED, PAPER_WORLD, changed_settings
+from avn.pipeline.benchmark import PAPER_WORLD, changed_settings, compared
 from avn.pipeline.replay import Run
 
 # Settings of the world and of how an agent observes. Others are named only if needed.
@@ -39,8 +39,10 @@ def names_of(runs: Sequence[Run]) -> list[str]:
 
 def settings_but_seed(run: Run) -> str:
     """Return all settings of a run that change its records, without the seed of its episodes."""
-    others = ("seed", *(key for key in NOT_COMPARED if key != "train_seed"))
-    return repr([(key, value) for key, value in run.settings.items() if key not in others])
+    kept = {
+        key: value for key, value in run.settings.items() if key == "train_seed" or compared(key)
+    }
+    return repr([(key, value) for key, value in kept.items() if key != "seed"])
 
 
 def _name(run: Run, parts: dict[str, str]) -> str:

@@ -1,7 +1,7 @@
 """Partial graph: the knowledge of N agents about the squares around them, as nodes and edges.
 
-The nodes are squares of a map, and edges join neighbours. Unknown squares count as free; a blocked
-square has no node and no edges.
+The nodes are squares of a map, and edges join neighbours. Unknown squares count as free, unless the
+rules say otherwise; a blocked square has no node and no edges.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class GraphRules:
     Attributes
     ----------
     obstacle_threshold : float
-        Squares whose probability of being free is below this are no nodes, 0 to 0.5. Unknown
-        squares have probability 0.5 and are nodes.
+        Squares whose probability of being free is below this are no nodes, 0 to 1. Unknown squares
+        have probability 0.5: above 0.5 they are no nodes.
     collision_cost : float
         Cost of a collision, moves, 0 to 1000. Entering a square that is free with probability p
         costs 1 + `collision_cost` (1 - p).
@@ -40,11 +40,8 @@ class GraphRules:
 
     def __post_init__(self) -> None:
         """Check the settings."""
-        if not 0 <= self.obstacle_threshold <= 0.5:
-            raise UserError(
-                f"planner.obstacle_threshold: {self.obstacle_threshold}; give 0 to 0.5, for an "
-                "unknown square is believed to be free by 0.5 and must be a node"
-            )
+        if not 0 <= self.obstacle_threshold <= 1:
+            raise UserError(f"planner.obstacle_threshold: {self.obstacle_threshold}; give 0 to 1")
         if not 0 <= self.collision_cost <= 1000:
             raise UserError(f"planner.collision_cost: {self.collision_cost}; give moves, 0 to 1000")
 
@@ -70,9 +67,8 @@ class PartialGraph:
 
     def __init__(self, n: int, size: int, rules: GraphRules) -> None:
         self.rules = rules
-        self.cost: NDArray[np.float32] = np.full(
-            (n, size, size), 1 + 0.5 * rules.collision_cost, dtype=np.float32
-        )
+        unknown = np.inf if rules.obstacle_threshold > 0.5 else 1 + 0.5 * rules.collision_cost
+        self.cost: NDArray[np.float32] = np.full((n, size, size), unknown, dtype=np.float32)
         self.walls: NDArray[np.uint8] = np.zeros((n, size, size), dtype=np.uint8)
 
     def set(self, squares: Tensor, belief: Tensor, rows: Tensor | None = None) -> None:
