@@ -29,9 +29,9 @@ def runs(tmp_path):
             "{" if agent == "broken" else yaml.safe_dump(cfg, sort_keys=False)
         )
         pooled = "all" if len(sounds) > 1 else sounds[0]
-        rows = [f"{pooled},room_1,0.9,0.9", f"{pooled},average,{rate},{rate / 2}"]
-        rows += ["ring,average,0.1,0.1"] if len(sounds) > 1 else []
-        (folder / "results.csv").write_text("\n".join(["sound,scene,sr,spl", *rows]) + "\n")
+        rows = [f"{pooled},room_1,0.9,0.9,0", f"{pooled},average,{rate},{rate / 2},0"]
+        rows += ["ring,average,0.1,0.1,0"] if len(sounds) > 1 else []
+        (folder / "results.csv").write_text("\n".join(["sound,scene,sr,spl,sna_goal", *rows]) + "\n")
     (tmp_path / "eval" / "greedy" / "ring" / "seed0-unfinished").mkdir(parents=True)
     return tmp_path
 
@@ -59,6 +59,14 @@ def test_runs_are_filtered_and_sorted_by_column(runs, capsys):
     assert listed(capsys, *shared, "agent=greedy", "seed=1") == []
     by = [row["success"] for row in listed(capsys, *shared, "sort=-spl")]
     assert by == [0.5, 0.25, 0.125]
+
+
+def test_a_run_of_an_earlier_version_has_no_figures(runs, capsys):
+    (results,) = (runs / "eval" / "greedy").rglob("results.csv")
+    lines = results.read_text().splitlines()
+    results.write_text("\n".join(line.rpartition(",")[0] for line in lines) + "\n")
+    (row,) = listed(capsys, f"outputs={runs}", "format=json", "agent=greedy")
+    assert (row["success"], row["spl"], row["protocol"]) == (None, None, "stop")
 
 
 def test_the_table_and_csv_hold_the_same(runs, capsys):

@@ -27,7 +27,7 @@ class Greedy(Agent):
     ----------
     slack : float
         Tolerance of Stop, metres, 0 to 100. Under a protocol with Stop, the agent stops if the
-        estimate is at most this far beyond the goal; the default is half a cell.
+        estimate is at most this far beyond the outermost goal cell; the default is half a cell.
     max_rotations : int
         Quarter turns at one position after which it moves forward, 1 or more. The limit prevents
         endless turning if the estimates of different headings contradict each other.
@@ -76,4 +76,5 @@ class Greedy(Agent):
         if self.protocol.goal == "box":
             return torch.maximum(right.abs(), front.abs()) <= CELL + self.slack
         # Moves go along the axes, so the length of the path is the sum of both components.
-        return right.abs() + front.abs() <= self.protocol.radius + self.slack
+        reach = CELL * self.protocol.most_goal_moves
+        return right.abs() + front.abs() <= reach + self.slack

@@ -16,7 +16,7 @@ from avn.apartments.floor_plan import CELL
 from avn.core.actions import HEADINGS, action_error
 from avn.core.errors import UserError
 from avn.core.random import derive
-from avn.navigation.distances import fewest_actions
+from avn.navigation.distances import actions_to_cells, fewest_actions
 from avn.navigation.episodes import Episodes
 from avn.navigation.metrics import sna, soft_spl, spl
 from avn.navigation.navigation_scene import NavigationScene
@@ -169,7 +169,7 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
     )
     shortest, remaining = distances.shortest[source, start], distances.shortest[source, end]
     success, actions = simulator.success.numpy(), simulator.actions.numpy()
-    fewest = _fewest(simulator)
+    fewest, to_source = _fewest(simulator), _fewest_to_source(simulator)
     return pd.DataFrame(
         {
             "agent": labels.agent,
@@ -193,13 +193,15 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
             "shortest": shortest,
             "actions": actions,
             "fewest_actions": fewest,
+            "fewest_actions_to_source": to_source,
             "collisions": simulator.collisions.numpy(),
             "outcome": _outcome(simulator),
             "success": success.astype(np.int64),
             "spl": spl(success, path, shortest),
             "softspl": soft_spl(remaining, path, shortest),
-            "sna": sna(success, actions, fewest),
+            "sna": sna(success, actions, to_source),
             "dtg": CELL * distances.source_moves[source, end],
+            "sna_goal": sna(success, actions, fewest),
         }
     )
 
@@ -211,6 +213,14 @@ def _fewest(simulator: Simulator) -> np.ndarray:
     neighbours = simulator.scene.grid.neighbours
     costs = fewest_actions(neighbours, distances.goal, int(allowance.max()))
     own = costs[allowance, episodes.source, episodes.start].astype(np.int64)
+    return own + int(simulator.protocol.requires_stop)
+
+
+def _fewest_to_source(simulator: Simulator) -> np.ndarray:
+    """Return the fewest actions to the source's cell, including Stop, (N,)."""
+    scene, episodes = simulator.scene, simulator.episodes
+    costs = actions_to_cells(scene.grid.neighbours, np.asarray(scene.sources))
+    own: np.ndarray = costs[episodes.source, episodes.start]
     return own + int(simulator.protocol.requires_stop)
 
 

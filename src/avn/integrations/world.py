@@ -253,8 +253,11 @@ def _unread_keys(cfg: DictConfig, part: str, max_steps: MaxSteps) -> tuple[str, 
         unread.append("protocol.radius")
     if part != "test" or cfg.episodes != "frozen":
         unread += ["protocol.num_starts", "protocol.exploration_steps"]
-    if part != "test" and max_steps is not None:
+    limited = part == "test" or max_steps is None
+    if not limited:
         unread += ["protocol.max_actions", "protocol.max_moves_ratio"]
+    if not limited or cfg.protocol.max_moves_ratio is None:
+        unread.append("protocol.cap")
     return tuple(unread)
 
 

@@ -215,6 +215,5 @@ class BatchedEpisodes:
         """Return the episodes whose limit of actions or moves is reached, (N,) bool."""
         if self.max_steps is not None:
             return self.actions >= self.max_steps
-        moves = self.tables.moves[self.tables.goal_row[self.source] + self.start]
-        most = self.protocol.most_moves(moves)
+        most = self.tables.most_moves[self.tables.goal_row[self.source] + self.start]
         return self.protocol.out_of_time(self.actions, self.attempted, most)

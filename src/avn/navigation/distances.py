@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
 
 from avn.apartments.floor_plan import CELL
 from avn.apartments.grid import Grid
-from avn.core.actions import HEADINGS
+from avn.core.actions import HEADINGS, STOP, transitions
 from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.protocols import Protocol
 
@@ -29,8 +32,10 @@ class Distances:
         Moves of the shortest path to the source cell.
     shortest : (K, C) float64
         The l of SPL, in moves or metres as the protocol says.
+    most_moves : (K, C) int64
+        Attempted moves that end an episode which starts in the cell; see `Protocol.most_moves`.
     allowance : (K, C) int64
-        Largest number of moves of a path with p <= l.
+        Largest number of moves of a path with p <= l that ends within the limit.
     crossings : (K, C) int64
         Least number of room borders on a shortest path to the source.
     """
@@ -38,6 +43,7 @@ class Distances:
     goal: NDArray[np.bool_]
     source_moves: NDArray[np.int64]
     shortest: NDArray[np.float64]
+    most_moves: NDArray[np.int64]
     allowance: NDArray[np.int64]
     crossings: NDArray[np.int64]
 
@@ -47,13 +53,17 @@ def measure(scene: NavigationScene, protocol: Protocol) -> Distances:
     grid, sources = scene.grid, np.asarray(scene.sources)
     goal = protocol.goal_cells(grid, sources)
     source_moves = grid.distances[sources].astype(np.int64)
+    goal_moves = _moves_to(goal, grid)
     if protocol.path_length == "metres":
-        allowance = source_moves
-        shortest = CELL * source_moves.astype(np.float64)
+        best, shortest = source_moves, CELL * source_moves.astype(np.float64)
     else:
-        allowance = _moves_to(goal, grid)
-        shortest = allowance.astype(np.float64)
-    return Distances(goal, source_moves, shortest, allowance, _crossings(grid, source_moves))
+        best, shortest = goal_moves, goal_moves.astype(np.float64)
+    capped = goal_moves if protocol.cap == "goal" else source_moves
+    most_moves: NDArray[np.int64] = protocol.most_moves(torch.from_numpy(capped)).numpy()
+    # A move that reaches the limit ends the episode, so that no Stop can follow it.
+    allowance = np.maximum(goal_moves, np.minimum(best, most_moves - protocol.requires_stop))
+    crossings = _crossings(grid, source_moves)
+    return Distances(goal, source_moves, shortest, most_moves, allowance, crossings)
 
 
 def _moves_to(goal: NDArray[np.bool_], grid: Grid) -> NDArray[np.int64]:
@@ -78,6 +88,8 @@ def fewest_actions(
     neighbours: NDArray[np.int32], goal: NDArray[np.bool_], moves: int
 ) -> NDArray[np.int16]:
     """Compute the fewest moves and rotations to the goal with a limited number of moves.
+
+    `actions_to_cells` has no such limit.
 
     The agent moves forward or backward and turns by quarters, each of which is one action. The
     limit excludes longer paths that save turns. The method is dynamic programming over the moves
@@ -114,3 +126,32 @@ def fewest_actions(
         turned = (moved[:, :, None, :] + turns).min(axis=-1)
         costs[left] = np.minimum(costs[left], turned)
     return costs.reshape(moves + 1, sources, cells * HEADINGS)
+
+
+def actions_to_cells(
+    neighbours: NDArray[np.int32], cells: NDArray[np.int32]
+) -> NDArray[np.int64]:
+    """Compute the fewest moves and rotations to K cells, in any heading at the end.
+
+    Parameters
+    ----------
+    neighbours : (C, 4) int
+        The cell to the north, east, south and west, or -1.
+    cells : (K,) int
+        Cells to reach.
+
+    Returns
+    -------
+    (K, 4 C) int64
+        Actions by cell to reach and state.
+    """
+    following = transitions(neighbours)[:, :STOP]
+    states = len(following)
+    before = np.repeat(np.arange(states), STOP)
+    # from the state after an action to the one before it; cells to reach are joined by their states
+    backward = coo_matrix(
+        (np.ones(before.size), (following.reshape(-1), before)), shape=(states, states)
+    ).tocsr()
+    ends = HEADINGS * np.asarray(cells)[:, None] + np.arange(HEADINGS)
+    nearest = [dijkstra(backward, indices=own, unweighted=True, min_only=True) for own in ends]
+    return np.stack(nearest).astype(np.int64)

@@ -61,7 +61,9 @@ def soft_spl(remaining: ArrayLike, path: ArrayLike, shortest: ArrayLike) -> Floa
 def sna(success: ArrayLike, actions: ArrayLike, fewest: ArrayLike) -> Floats:
     """Compute success weighted by number of actions (SNA): S a* / max(a, a*).
 
-    Chen et al., "Learning to Set Waypoints for Audio-Visual Navigation", 2021.
+    Chen et al., "Learning to Set Waypoints for Audio-Visual Navigation", 2021. The column `sna` of
+    a run takes a* to the cell of the source, as SoundSpaces does; `sna_goal` takes the fewest
+    actions that succeed, which are fewer, since goal cells lie around the source.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ def sna(success: ArrayLike, actions: ArrayLike, fewest: ArrayLike) -> Floats:
     actions : (N,) array_like
         a, the number of actions, including rotations and Stop.
     fewest : (N,) array_like
-        a*, the fewest actions that succeed, including rotations and Stop; above 0.
+        a*, the fewest actions of an episode, including rotations and Stop; above 0.
 
     Returns
     -------

@@ -43,6 +43,8 @@ class SceneBatch:
         `goal[goal_row[source] + state]` is True if the state is at the goal of the source.
     moves : (...,) int64
         Moves to the cell of the source, in the layout of `goal`.
+    most_moves : (...,) int64
+        Attempted moves that end an episode from each state, in the layout of `goal`.
     clip_row : (Q,) int64
         Row of the first clip of each source; see `clip`.
     sounds, realisations : int
@@ -66,6 +68,7 @@ class SceneBatch:
     goal: Tensor
     goal_row: Tensor
     moves: Tensor
+    most_moves: Tensor
     shortest: Tensor
     clip_row: Tensor
     sounds: int
@@ -234,6 +237,7 @@ def build_scene_batch(
         goal=_by_state([d.goal for d in distances]),
         goal_row=row,
         moves=_by_state([d.source_moves for d in distances]),
+        most_moves=_by_state([d.most_moves for d in distances]),
         shortest=_by_state([d.shortest for d in distances]),
         clip_row=row * sounds * realisations,
         sounds=sounds,

@@ -79,8 +79,7 @@ class Simulator:
         self.tables = build_scene_batch([scene], protocol, [observed], sounds)
         self._goal_row = self.tables.goal_row[self.source]
         self._origin = self.tables.origin(self.start)
-        moves = self.tables.moves[self._goal_row + self.start]
-        self.max_attempts = protocol.most_moves(moves)
+        self.max_attempts = self.tables.most_moves[self._goal_row + self.start]
         self._realisations = self._drawn()
         self.reset()
 

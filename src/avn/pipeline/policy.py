@@ -18,6 +18,7 @@ from avn.core.files import check_name
 from avn.core.progress import log
 from avn.core.settings import plain
 from avn.mapping.ego_map import EgoMap
+from avn.navigation.protocols import GOAL_MEANINGS
 from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.policy_data import (
     SUBSETS,
@@ -103,7 +104,10 @@ class Policy(Trained):
     def ignored(self) -> Sequence[str]:
         """Return keys of evaluation only, and keys of parts that the agent does not have."""
         memory, maps = self.cfg.baseline.memory, has_occupancy_model(self.cfg)
-        radius = self.cfg.protocol.goal != "radius"
+        protocol = self.cfg.protocol
+        radius = protocol.goal != "radius"
+        # the default cap enters no fingerprint
+        cap = protocol.max_moves_ratio is None or protocol.cap == Protocol.cap
         return [
             "baseline.samples",
             # of evaluations, and a label
@@ -117,8 +121,18 @@ class Policy(Trained):
             *(() if maps else ("baseline.map_width",)),
             *(() if memory and maps else ("baseline.top",)),
             *(("protocol.radius",) if radius else ()),
+            *(("protocol.cap",) if cap else ()),
             *(() if has_sound_model(self.cfg) else ("algorithm.realisations",)),
         ]
+
+    def consulted(self) -> Sequence[str]:
+        """Return the key of the cap, where there is one."""
+        capped = self.cfg.protocol.max_moves_ratio is not None
+        return (*super().consulted(), *(("protocol.cap",) if capped else ()))
+
+    def content(self) -> Any:
+        """Return the meaning of the goal, where it has changed."""
+        return GOAL_MEANINGS.get(self.cfg.protocol.goal)
 
     @property
     def title(self) -> str:

@@ -59,7 +59,7 @@ class Evaluation(Stage):
 
     kind = "eval"
     # Raised when the code of simulator, agents or metrics changes a record.
-    version = 4
+    version = 5
 
     @property
     def apartments(self) -> Apartments:
@@ -103,7 +103,8 @@ class Evaluation(Stage):
         radius = () if self.cfg.protocol.goal == "radius" else ("protocol.radius",)
         frozen = self.cfg.episodes == "frozen"
         lists = () if frozen else ("protocol.num_starts", "protocol.exploration_steps")
-        return (*agent_ignored(self.cfg), *radius, *lists)
+        cap = ("protocol.cap",) if self.cfg.protocol.max_moves_ratio is None else ()
+        return (*agent_ignored(self.cfg), *radius, *lists, *cap)
 
     @property
     def _walks_first(self) -> bool:

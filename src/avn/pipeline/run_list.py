@@ -27,6 +27,8 @@ FORMATS = ("table", "csv", "json")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 # Names in the files that `avn.pipeline.run` writes; not imported, because that imports torch.
 _CONFIG, _RESULTS, _AVERAGE, _ALL = "config.yaml", "results.csv", "average", "all"
+# Newest column of the results; runs without it were made by an earlier version.
+_NEWEST = "sna_goal"
 
 Row = dict[str, Any]
 
@@ -46,7 +48,10 @@ def run_folders(outputs: Path) -> list[Path]:
 
 
 def list_runs(outputs: Path) -> list[Row]:
-    """Return a row with the `COLUMNS` for each finished run; damaged runs have empty values."""
+    """Return a row with the `COLUMNS` for each finished run.
+
+    Damaged runs, and those of earlier versions, whose rules may differ, have empty values.
+    """
     return [_row(folder) for folder in run_folders(outputs)]
 
 
@@ -137,6 +142,8 @@ def _metrics(path: Path) -> Row:
         with path.open(encoding="utf-8", newline="") as file:
             rows = [row for row in csv.DictReader(file) if row["scene"] == _AVERAGE]
         pooled = [row for row in rows if row["sound"] == _ALL] or rows
+        if _NEWEST not in pooled[0]:
+            return {}
         return {"success": float(pooled[0]["sr"]), "spl": float(pooled[0]["spl"])}
     except (OSError, ValueError, KeyError, IndexError, TypeError):
         return {}

@@ -11,7 +11,7 @@ from omegaconf import DictConfig
 from avn.core.classes import build_object
 from avn.core.progress import progress_bar
 from avn.modules.stop_threshold import CRITERIA, best_threshold, check_decision
-from avn.navigation.protocols import Protocol
+from avn.navigation.protocols import GOAL_MEANINGS, Protocol
 from avn.pipeline.apartments import TRAINING
 from avn.pipeline.audio_inference import CLIPS_PER_SECOND, AudioInference
 from avn.pipeline.sounds import sound_files
@@ -50,6 +50,10 @@ class StopNetwork(TrainedOnClips):
     def ignored(self) -> Sequence[str]:
         """Return the keys of the decision."""
         return DECISION
+
+    def content(self) -> Any:
+        """Return the hashes of the recordings, and the meaning of the goal where it has changed."""
+        return [*super().content(), *GOAL_MEANINGS.get(self.cfg.protocol.goal, ())]
 
     @property
     def title(self) -> str:

@@ -34,7 +34,7 @@ SETTINGS: dict[str, type] = {
 # Settings whose names would sort before `sound`.
 _BEHIND = ("kind", "mapper", "planner", "look", "localisation", "exploration", "episodes")
 # Columns of metrics: of runs, and the best value by which a training is judged.
-METRICS = ("success", "spl", "softspl", "sna", "dtg", "best_validation")
+METRICS = ("success", "spl", "softspl", "sna", "dtg", "sna_goal", "best_validation")
 
 
 def write_summary(

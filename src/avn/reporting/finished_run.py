@@ -36,18 +36,28 @@ def read_episodes(folder: Path) -> pd.DataFrame:
     Raises
     ------
     UserError
-        Where a file is missing or damaged, or the results do not match the episodes.
+        Where a file is missing or damaged, the results do not match the episodes, or an earlier
+        version wrote them with other columns.
     """
+    damaged = UserError(f"{folder}: the run is damaged; delete the folder and run again")
+    try:
+        runs, episodes = (results.read_csv(folder / name) for name in (RESULTS, EPISODE_RECORDS))
+    except (OSError, ValueError) as error:
+        raise damaged from error
+    lacking = [name for name in results.EPISODE_COLUMNS if name not in episodes]
+    if lacking and set(results.LABELS) <= set(episodes):
+        raise UserError(
+            f"{folder}: an earlier version of avn made the run, {EPISODE_RECORDS} has no "
+            f"{', '.join(lacking)}; delete the folder and run again"
+        )
     ends = list(results.INTERVALS)
     try:
-        runs = results.read_csv(folder / RESULTS)
-        episodes = results.read_csv(folder / EPISODE_RECORDS)
         if episodes[list(results.METRICS.values())].isna().any(axis=None):
             raise ValueError("a metric is missing")
         summary = results.summarise(episodes, draws=0)
         pd.testing.assert_frame_equal(runs.drop(columns=ends), summary.drop(columns=ends))
-    except (OSError, ValueError, KeyError, TypeError, AssertionError, UserError) as error:
-        raise UserError(f"{folder}: the run is damaged; delete the folder and run again") from error
+    except (ValueError, KeyError, TypeError, AssertionError, UserError) as error:
+        raise damaged from error
     return episodes
 
 

@@ -20,12 +20,14 @@ EPISODE_COLUMNS = (
     *LABELS,
     *("sound", "scene", "seed", "episode", "start_cell", "start_heading", "source", "source_cell"),
     *("in_sight", "rooms_crossed", "geodesic", "euclidean", "end_cell", "path_length", "shortest"),
-    *("actions", "fewest_actions", "collisions", "outcome"),
-    *("success", "spl", "softspl", "sna", "dtg"),
+    *("actions", "fewest_actions", "fewest_actions_to_source", "collisions", "outcome"),
+    *("success", "spl", "softspl", "sna", "dtg", "sna_goal"),
 )
 # Metrics of results.csv, and the column of episodes.csv that each is the mean of. Rates are from 0
 # to 1; dtg is in metres.
-METRICS = {"sr": "success", "spl": "spl", "softspl": "softspl", "sna": "sna", "dtg": "dtg"}
+METRICS = {"sr": "success"} | {
+    name: name for name in ("spl", "softspl", "sna", "dtg", "sna_goal")
+}
 INTERVALS = tuple(f"{metric}_{end}" for metric in METRICS for end in ("low", "high"))
 RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *METRICS, *INTERVALS)
 ALL_SOUNDS = "all"
