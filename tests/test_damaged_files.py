@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import h5py
+import pandas as pd
 import pytest
 import torch
 from small import SMALL, composed, fitting
@@ -21,8 +22,11 @@ def outputs(tmp_path_factory):
 
 
 def run_greedy(command, outputs, *more):
-    settings = fitting("agent=greedy", *WORLD)
-    return command("eval", "agent=greedy", *settings, f"outputs={outputs}", *more)
+    return command("eval", *_greedy(outputs), *more)
+
+
+def _greedy(outputs):
+    return ("agent=greedy", *fitting("agent=greedy", *WORLD), f"outputs={outputs}")
 
 
 def copied(command, outputs, tmp_path):
@@ -99,6 +103,24 @@ def test_a_damaged_run_is_one_line(command, outputs, tmp_path, name, spoil):
     assert code == 2
     assert str(folder) in err[-1]
     assert "damaged; delete the folder" in err[-1]
+
+
+def test_a_run_of_an_earlier_version_is_one_line(command, outputs, tmp_path):
+    _, out, _ = run_greedy(command, outputs, "sound=alarm")
+    mine = copied(command, outputs, tmp_path)
+    folder = mine / Path(out[-1]).relative_to(outputs)
+    for name in ("episodes.csv", "results.csv"):
+        table = pd.read_csv(folder / name)
+        lacking = [column for column in table if "sna_goal" in column]
+        assert lacking
+        table.drop(columns=lacking).to_csv(folder / name, index=False)
+    for call in (("eval", *_greedy(mine), "sound=alarm"), ("figures", str(folder))):
+        code, _, err = command(*call)
+        assert code == 2
+        assert err[-1].endswith(
+            f"{folder}: an earlier version of avn made the run, episodes.csv has no sna_goal; "
+            "delete the folder and run again"
+        )
 
 
 def test_a_bit_of_a_checkpoint_that_flipped_is_one_line(command, outputs, tmp_path):

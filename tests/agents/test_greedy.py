@@ -44,12 +44,13 @@ def test_turns_to_the_larger_part_and_walks(protocol: Protocol) -> None:
 
 
 def test_stops_within_reach_only_where_it_may(protocol: Protocol) -> None:
-    agent = begin(Greedy(), 4, protocol)
-    actions = agent.act(hearing((0.5, 0.6), (0.0, 1.0), (0.6, 0.7), (0.1, 1.5)))
+    agent = begin(Greedy(), 5, protocol)
+    actions = agent.act(hearing((0.5, 0.6), (0.0, 1.0), (0.6, 0.7), (0.1, 1.5), (-0.1, 0.6)))
+    # Half a cell beyond the outermost goal cells: at 0.5 m under "stop", since 1 m is too far.
     expected = {
-        "var": [FORWARD] * 4,
-        "var_stop": [STOP, FORWARD, STOP, FORWARD],
-        "stop": [STOP, STOP, FORWARD, FORWARD],
+        "var": [FORWARD] * 5,
+        "var_stop": [STOP, FORWARD, STOP, FORWARD, STOP],
+        "stop": [FORWARD, FORWARD, FORWARD, FORWARD, STOP],
     }
     assert actions.tolist() == expected[protocol.name]
 

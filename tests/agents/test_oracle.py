@@ -1,5 +1,7 @@
 import dataclasses
 
+import pytest
+
 from avn.agents.oracle import Oracle
 from avn.agents.rollout import Labels, rollout_scene
 from avn.navigation.episodes import exhaustive_episodes
@@ -29,6 +31,28 @@ def test_oracle_does_not_go_round_to_save_turns(flat: DrawnScene, protocol: Prot
     frame = rollout_scene(Oracle(), flat, episodes, wide, LABELS)
     assert (frame["path_length"] <= frame["geodesic"]).all()
     assert (frame["spl"] == 1.0).all()
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("path_length", ["moves", "metres"])
+@pytest.mark.parametrize("goal", ["box", "radius"])
+def test_oracle_arrives_before_the_cap(
+    flat: DrawnScene, protocol: Protocol, goal: str, path_length: str, ratio: float
+) -> None:
+    for cap in ("source", "goal") if ratio > 1 or not protocol.requires_stop else ("source",):
+        rules = dataclasses.replace(
+            protocol,
+            goal=goal,
+            radius=2.5,
+            path_length=path_length,
+            max_moves_ratio=ratio,
+            cap=cap,
+        )
+        episodes = exhaustive_episodes(flat, ["ring"], rules, seed=0)
+        frame = rollout_scene(Oracle(), flat, episodes, rules, LABELS)
+        assert (frame["success"] == 1).all()
+        assert (frame["spl"] == 1.0).all()
+        assert (frame["actions"] == frame["fewest_actions"]).all()
 
 
 def test_oracle_says_that_it_is_privileged() -> None:

@@ -60,18 +60,52 @@ def test_records_under_stop_by_hand(corridor: DrawnScene, protocols: dict[str, P
     episodes = exhaustive_episodes(corridor, ["ring"], protocols["stop"], seed=0)
     frame = rollout_scene(Forward(3), corridor, episodes, protocols["stop"], LABELS)
     arrived = row_of(frame, cell=4, heading=3)
-    # Three of four moves to the source, 1.5 m of 2.0 m; two moves and Stop would have done.
+    # Three of four moves to the source, 1.5 m of 2.0 m, and Stop: the fewest that succeed.
     assert (arrived["outcome"], arrived["path_length"], arrived["shortest"]) == (
         "success",
         1.5,
         2.0,
     )
-    assert (arrived["actions"], arrived["fewest_actions"]) == (4, 3)
-    assert (arrived["spl"], arrived["softspl"], arrived["sna"]) == (1.0, 0.75, 0.75)
+    assert (arrived["actions"], arrived["fewest_actions"]) == (4, 4)
+    assert (arrived["spl"], arrived["softspl"], arrived["sna_goal"]) == (1.0, 0.75, 1.0)
     assert arrived["dtg"] == 0.5
     short = row_of(frame, cell=8, heading=3)
     assert (short["outcome"], short["dtg"], short["spl"]) == ("stopped_elsewhere", 2.5, 0.0)
     assert short["softspl"] == pytest.approx(1.5 / 4.0)
+
+
+class Script(Agent):
+    """Takes the actions of a list, and then turns."""
+
+    def __init__(self, *actions: int) -> None:
+        self.actions = list(actions)
+
+    def act(self, observation: TensorDict) -> Tensor:
+        return torch.full((self.n,), self.actions.pop(0) if self.actions else 2)
+
+
+def test_sna_counts_to_the_source_and_sna_goal_to_the_goal(
+    corridor: DrawnScene, protocols: dict[str, Protocol]
+) -> None:
+    # From cell 4 facing north: a turn, four moves and Stop to the source, three to the goal. The
+    # agent turns thrice as often as it has to, and stops at the edge of the goal.
+    episodes = exhaustive_episodes(corridor, ["ring"], protocols["stop"], seed=0)
+    agent = Script(2, 3, 2, 0, 0, 0, 4)
+    frame = rollout_scene(agent, corridor, episodes, protocols["stop"], LABELS)
+    row = row_of(frame, cell=4, heading=0)
+    assert (row["outcome"], row["actions"]) == ("success", 7)
+    assert (row["fewest_actions_to_source"], row["fewest_actions"]) == (6, 5)
+    assert (row["sna"], row["sna_goal"]) == (6 / 7, 5 / 7)
+    # a failure, and an agent that takes fewer actions than the way to the source has
+    assert row_of(frame, cell=8, heading=0)["sna"] == 0.0
+    straight = rollout_scene(Script(2, 0, 0, 0, 4), corridor, episodes, protocols["stop"], LABELS)
+    row = row_of(straight, cell=4, heading=0)
+    assert (row["actions"], row["sna"], row["sna_goal"]) == (5, 1.0, 1.0)
+    # without Stop there is none to count
+    episodes = exhaustive_episodes(corridor, ["ring"], protocols["var"], seed=0)
+    frame = rollout_scene(Script(2, 0, 0, 0), corridor, episodes, protocols["var"], LABELS)
+    row = row_of(frame, cell=4, heading=0)
+    assert (row["fewest_actions_to_source"], row["fewest_actions"]) == (5, 4)
 
 
 def test_out_of_actions(corridor: DrawnScene, protocols: dict[str, Protocol]) -> None:

@@ -116,6 +116,11 @@ def test_an_episode_is_cut_off_or_ends_at_the_goal(maker, options):
         ({"overrides": ["split=mini", "mapper.size=51"]}, "mapper.size: not read"),
         ({"overrides": ["split=mini", "baseline.map_width=5"]}, "baseline.map_width: not read"),
         ({"overrides": ["split=mini", "sound=alarm"]}, "sound: not read"),
+        ({"overrides": ["split=mini", "protocol.cap=goal"]}, "protocol.cap: not read"),
+        (
+            {"overrides": ["split=mini", "protocol=stop", "protocol.cap=goal"], "max_steps": None},
+            "protocol.cap: not read",
+        ),
         ({"overrides": ["split=mini", "seed=3"]}, "seed: not read"),
         ({"overrides": ["split=mini", "split.sizes=3"]}, "split.sizes|sizes"),
         ({"overrides": ["split=mini", "planner.detour=3"]}, "detour"),

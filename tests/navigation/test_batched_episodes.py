@@ -17,7 +17,9 @@ PROTOCOLS = {
     "stop": Protocol("stop", "radius", True, "metres"),
     # caps that episodes run into within the steps of the test
     "short": Protocol("short", "box", False, "metres", max_actions=9),
-    "half": Protocol("half", "radius", False, "moves", radius=0.5, max_moves_ratio=1.3),
+    "half": Protocol("half", "radius", False, "moves", radius=1.0, max_moves_ratio=1.3),
+    "goal_cap": Protocol("goal_cap", "box", False, "moves", max_moves_ratio=1.5, cap="goal"),
+    "metres": Protocol("metres", "box", True, "metres", max_moves_ratio=1.5, cap="goal"),
 }
 SECOND = "aaaa\naBaa\naaaA\naa.a"
 

@@ -1,8 +1,11 @@
+import dataclasses
+
 import networkx as nx
 import numpy as np
+import pytest
 
 from avn.core.actions import MOVES, STOP, transitions
-from avn.navigation.distances import UNREACHABLE, fewest_actions, measure
+from avn.navigation.distances import UNREACHABLE, actions_to_cells, fewest_actions, measure
 from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.protocols import Protocol
 
@@ -50,6 +53,51 @@ def test_fewest_actions_agrees_with_dijkstra_over_states_and_moves_left(
             for state in range(len(table)):
                 wanted = expected.get((state, left), UNREACHABLE)
                 assert min(int(costs[left, source, state]), UNREACHABLE) == wanted
+
+
+def test_actions_to_cells_agree_with_breadth_first_search() -> None:
+    scene = draw("maze", MAZE)
+    table = transitions(scene.grid.neighbours)
+    graph = nx.DiGraph(
+        (after, state) for state, nexts in enumerate(table.tolist()) for after in nexts[:STOP]
+    )
+    found = actions_to_cells(scene.grid.neighbours, scene.sources)
+    for cell, costs in zip(scene.sources.tolist(), found.tolist(), strict=True):
+        ends = {4 * cell + heading for heading in range(4)}
+        expected = nx.multi_source_dijkstra_path_length(graph, ends, weight=None)
+        assert costs == [expected[state] for state in range(len(table))]
+
+
+def test_actions_to_cells_may_go_round_to_save_turns() -> None:
+    # Stairs of ten moves and nine turns, and a way round of twelve moves and fewer turns.
+    scene = draw("stairs", """
+        aaaaaaA
+        a####aa
+        a###aa#
+        a##aa##
+        a#aa###
+        aaa####
+    """)  # fmt: skip
+    start = 4 * scene.grid.lattice.tolist().index([2, 0]) + 3
+    source = int(scene.sources[0])
+    moves = int(scene.grid.distances[source, start // 4])
+    costs = actions_to_cells(scene.grid.neighbours, scene.sources)[0, start]
+    goal = np.zeros((1, scene.grid.cells), dtype=bool)
+    goal[0, source] = True
+    shortest = fewest_actions(scene.grid.neighbours, goal, moves)[moves, 0, start]
+    assert (moves, shortest, costs) == (9, 17, 15)
+
+
+@pytest.mark.parametrize("path_length", ["moves", "metres"])
+def test_a_cap_to_the_goal_is_shorter_by_the_way_from_the_goal_to_the_source(
+    corridor: DrawnScene, protocols: dict[str, Protocol], path_length: str
+) -> None:
+    var = dataclasses.replace(protocols["var"], path_length=path_length)
+    to_source = measure(corridor, var)
+    to_goal = measure(corridor, dataclasses.replace(var, cap="goal"))
+    assert to_source.most_moves[0].tolist() == [2 * i for i in range(11)]
+    assert to_goal.most_moves[0].tolist() == [0, *(2 * (i - 1) for i in range(1, 11))]
+    assert (to_source.shortest == to_goal.shortest).all()
 
 
 def test_turning_of_the_first_heading_counts(corridor: DrawnScene) -> None:

@@ -1,5 +1,6 @@
 import dataclasses
 
+import numpy as np
 import pytest
 import torch
 
@@ -123,12 +124,57 @@ def test_stop_succeeds_within_a_metre_and_has_no_cap_on_moves(
 ) -> None:
     simulator = one(corridor, protocols["stop"], 3, WEST)
     assert not any(act(simulator, *[FORWARD] * 40))
-    assert act(simulator, BACKWARD, BACKWARD, STOP) == [False, False, True]
+    assert act(simulator, BACKWARD, STOP) == [False, True]
     assert simulator.success.item()
-    assert counts(simulator) == (42, 5, 37, 43)
+    assert counts(simulator) == (41, 4, 37, 42)
+    # 1 m from the source is not nearer than 1 m
     simulator = one(corridor, protocols["stop"], 3, WEST)
-    assert act(simulator, STOP) == [True]
+    assert act(simulator, FORWARD, STOP) == [False, True]
     assert not simulator.success.item()
+
+
+def test_the_cap_counts_to_the_source_or_to_the_goal(
+    corridor: DrawnScene, protocols: dict[str, Protocol]
+) -> None:
+    # The goal cells are 0 and 1: from cell 2, the source is 2 moves away and the goal 1.
+    for cap, most in (("source", 4), ("goal", 2)):
+        rules = dataclasses.replace(protocols["var"], cap=cap)
+        simulator = one(corridor, rules, 2, NORTH)
+        # rotations are free, and blocked moves count
+        assert act(simulator, LEFT, RIGHT) == [False, False]
+        assert act(simulator, *[FORWARD] * most) == [False] * (most - 1) + [True]
+        assert not simulator.success.item()
+        # the last move may arrive
+        simulator = one(corridor, rules, 2, NORTH)
+        act(simulator, *[FORWARD] * (most - 1), LEFT)
+        assert act(simulator, FORWARD) == [True]
+        assert simulator.success.item()
+    far = one(corridor, dataclasses.replace(protocols["var"], cap="goal"), 10, WEST)
+    assert far.max_attempts.tolist() == [18]
+
+
+@pytest.mark.parametrize(
+    ("cap", "heading", "wanted"), [("goal", WEST, 7 / 18), ("goal", NORTH, 5 / 18)]
+)
+def test_a_random_walk_next_to_the_goal_succeeds_as_computed_by_hand(
+    corridor: DrawnScene, protocols: dict[str, Protocol], cap: str, heading: int, wanted: float
+) -> None:
+    # Two attempted moves. A move goes along the axis of the last one with probability 2/3, and
+    # either way along it; north and south are blocked, and a move to the east is too far.
+    rules = dataclasses.replace(protocols["var"], cap=cap)
+    count = 20_000
+    episodes = dataclasses.replace(
+        exhaustive_episodes(corridor, ["ring"], rules, seed=0),
+        **{name: np.zeros(count, dtype=np.int64) for name in ("number", "sound", "source")},
+        start=np.full(count, 4 * 2 + heading),
+        trajectory_index=np.full(count, -1),
+    )
+    simulator = Simulator(corridor, episodes, rules)
+    generator = torch.Generator().manual_seed(0)
+    while not bool(simulator.done.all()):
+        simulator.step(torch.randint(4, (count,), generator=generator))
+    rate = float(simulator.success.double().mean())
+    assert rate == pytest.approx(wanted, abs=4 * (wanted * (1 - wanted) / count) ** 0.5)
 
 
 def test_a_finished_episode_stands_still(

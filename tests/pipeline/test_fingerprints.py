@@ -11,6 +11,7 @@ from small import composed
 from avn.apartments.generator import generate
 from avn.config.folder import conf_folder
 from avn.core.errors import UserError
+from avn.navigation.protocols import GOAL_MEANINGS
 from avn.pipeline.agent import build_agent
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.occupancy import LocalPatches, OccupancyNetwork
@@ -88,6 +89,7 @@ def moved(override):
         ("stop_model.criterion=balanced", RUN),
         ("stop_model.threshold=0.7", RUN),
         ("protocol.num_starts=5", RUN),
+        ("protocol.cap=goal", RUN),
         ("mapper.top=2", RUN),
         ("planner.max_rotations=5", RUN),
         ("localisation=retrieval", RUN),
@@ -340,6 +342,31 @@ def test_a_radius_is_another_goal():
     row = ("agent=plan_noexp", "protocol=stop", "split=mini")
     one, other = (StopNetwork(composed(*row, f"protocol.radius={r}")) for r in (1, 2))
     assert one.fingerprint != other.fingerprint
+
+
+def test_only_products_of_a_radius_depend_on_what_a_radius_means(monkeypatch):
+    def fingerprints(protocol):
+        rows = ("agent=ours_noexp", "agent=a3c_va")
+        planner, actor = (composed(row, protocol, "split=mini") for row in rows)
+        stages = (StopNetwork(planner), Policy(actor))
+        return [stage.fingerprint for stage in stages]
+
+    now = {protocol: fingerprints(f"protocol={protocol}") for protocol in ("stop", "var_stop")}
+    monkeypatch.delitem(GOAL_MEANINGS, "radius")
+    assert all(
+        one != other for one, other in zip(fingerprints("protocol=stop"), now["stop"], strict=True)
+    )
+    assert fingerprints("protocol=var_stop") == now["var_stop"]
+
+
+def test_the_default_cap_is_in_no_fingerprint_of_an_actor_critic():
+    row = ("agent=a3c_va", "split=mini")
+    default, other = (Policy(composed(*row, f"protocol.cap={cap}")) for cap in ("source", "goal"))
+    assert default.fingerprint != other.fingerprint
+    (rules,) = [node for node in default.inputs() if isinstance(node, dict) and "goal" in node]
+    assert "cap" not in rules
+    assert "protocol.cap" in default.read() & other.read()
+    assert "protocol.cap" not in Policy(composed(*row, "protocol=stop")).read()
 
 
 def test_sounds_are_told_apart_by_their_order():

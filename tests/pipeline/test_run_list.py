@@ -31,7 +31,9 @@ def runs(tmp_path):
         pooled = "all" if len(sounds) > 1 else sounds[0]
         rows = [f"{pooled},room_1,0.9,0.9,0", f"{pooled},average,{rate},{rate / 2},0"]
         rows += ["ring,average,0.1,0.1,0"] if len(sounds) > 1 else []
-        (folder / "results.csv").write_text("\n".join(["sound,scene,sr,spl,sna_goal", *rows]) + "\n")
+        (folder / "results.csv").write_text(
+            "\n".join(["sound,scene,sr,spl,sna_goal", *rows]) + "\n"
+        )
     (tmp_path / "eval" / "greedy" / "ring" / "seed0-unfinished").mkdir(parents=True)
     return tmp_path
 

@@ -44,7 +44,7 @@ def episodes(
     ]
     frame = pd.DataFrame(rows)
     frame["success"] = rng.integers(0, 2, len(frame))
-    for column in ("spl", "softspl", "sna"):
+    for column in ("spl", "softspl", "sna", "sna_goal"):
         frame[column] = frame["success"] * rng.random(len(frame))
     frame["dtg"] = 5 * rng.random(len(frame))
     return frame
@@ -59,9 +59,9 @@ def only(results: pd.DataFrame, **labels: str) -> pd.Series:
 
 def test_columns_are_the_published_ones() -> None:
     assert ",".join(RESULT_COLUMNS) == (
-        "agent,protocol,acoustics,look,sound,scene,seed,episodes,sr,spl,softspl,sna,dtg,"
+        "agent,protocol,acoustics,look,sound,scene,seed,episodes,sr,spl,softspl,sna,dtg,sna_goal,"
         "sr_low,sr_high,spl_low,spl_high,softspl_low,softspl_high,sna_low,sna_high,"
-        "dtg_low,dtg_high"
+        "dtg_low,dtg_high,sna_goal_low,sna_goal_high"
     )
     assert tuple(summarise(episodes()).columns) == RESULT_COLUMNS
     assert EPISODE_COLUMNS[:8] == (*RESULT_COLUMNS[:7], "episode")

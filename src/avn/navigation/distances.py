@@ -128,9 +128,7 @@ def fewest_actions(
     return costs.reshape(moves + 1, sources, cells * HEADINGS)
 
 
-def actions_to_cells(
-    neighbours: NDArray[np.int32], cells: NDArray[np.int32]
-) -> NDArray[np.int64]:
+def actions_to_cells(neighbours: NDArray[np.int32], cells: NDArray[np.int32]) -> NDArray[np.int64]:
     """Compute the fewest moves and rotations to K cells, in any heading at the end.
 
     Parameters

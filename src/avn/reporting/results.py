@@ -25,9 +25,7 @@ EPISODE_COLUMNS = (
 )
 # Metrics of results.csv, and the column of episodes.csv that each is the mean of. Rates are from 0
 # to 1; dtg is in metres.
-METRICS = {"sr": "success"} | {
-    name: name for name in ("spl", "softspl", "sna", "dtg", "sna_goal")
-}
+METRICS = {"sr": "success"} | {name: name for name in ("spl", "softspl", "sna", "dtg", "sna_goal")}
 INTERVALS = tuple(f"{metric}_{end}" for metric in METRICS for end in ("low", "high"))
 RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *METRICS, *INTERVALS)
 ALL_SOUNDS = "all"
