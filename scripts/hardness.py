@@ -45,12 +45,22 @@ class Hardness:
 
 
 def random_walk_odds(
-    grid: Grid, source: int
+    grid: Grid, source: int, cap: str = "source"
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Compute success and SPL of the uniform random walk from every cell to one source.
 
-    An episode ends after twice as many attempted moves as the source cell is away; p is the
-    number of attempted moves and l that of the shortest walk to the goal cells.
+    An episode ends after twice as many attempted moves as the source cell is away, or the nearest
+    goal cell with `cap="goal"`; p is the number of attempted moves and l that of the shortest walk
+    to the goal cells.
+
+    Parameters
+    ----------
+    grid : Grid
+        Cells of the apartment.
+    source : int
+        Cell of the source.
+    cap : {"source", "goal"}
+        As `protocol.cap`.
 
     Returns
     -------
@@ -64,14 +74,14 @@ def random_walk_odds(
     # Where the two moves along each axis end; a blocked one stays.
     landing = np.where(grid.neighbours >= 0, grid.neighbours, here[:, None])
     ways = (landing[:, (0, 2)], landing[:, (1, 3)])
-    cap = 2 * grid.distances[:, source].astype(int)
     shortest = grid.distances[:, goal].min(axis=1).astype(int)
+    limit = 2 * (shortest if cap == "goal" else grid.distances[:, source].astype(int))
     success, spl = np.zeros(grid.cells), np.zeros(grid.cells)
     # first[a, c]: odds that the k-th move, made along axis a from cell c, is the first to
     # enter the goal.
     first = np.stack([goal[way].mean(axis=1) for way in ways])
-    for step in range(1, int(cap.max()) + 1):
-        odds = np.where(step <= cap, first.mean(axis=0), 0.0)
+    for step in range(1, int(limit.max()) + 1):
+        odds = np.where(step <= limit, first.mean(axis=0), 0.0)
         success += odds
         spl += odds * shortest / np.maximum(step, shortest)
         next_axis = KEEPS_AXIS * first + (1 - KEEPS_AXIS) * first[::-1]

@@ -41,7 +41,8 @@ def test_by_hand_in_a_corridor() -> None:
     assert spl[2] == pytest.approx(weighted)
 
 
-def test_against_playing_it_out() -> None:
+@pytest.mark.parametrize("cap", ["source", "goal"])
+def test_against_playing_it_out(cap: str) -> None:
     rooms = (
         Room("kitchen", 0.0, 0.0, 3.0, 2.5, **FINISH),
         Room("bedroom", 3.0, 0.0, 5.5, 2.5, **FINISH),
@@ -49,7 +50,7 @@ def test_against_playing_it_out() -> None:
     plan = FloorPlan("two", rooms, (Doorway(3.0, 1.0, "y"),), sources=((1.0, 1.0),))
     grid = build_grid(plan)
     source = grid.lattice.tolist().index([2, 2])
-    success, spl, start = random_walk_odds(grid, source)
+    success, spl, start = random_walk_odds(grid, source, cap)
     goal = goal_cells(grid)[source]
     rng = np.random.default_rng(0)
     first = np.repeat(np.flatnonzero(start), 4 * 400)
@@ -57,7 +58,7 @@ def test_against_playing_it_out() -> None:
     moves, score = np.zeros(len(cell), dtype=int), np.zeros(len(cell))
     live = np.ones(len(cell), dtype=bool)
     shortest = grid.distances[:, goal].min(axis=1)[first]
-    cap = 2 * grid.distances[first, source]
+    limit = 2 * (shortest if cap == "goal" else grid.distances[first, source])
     for _ in range(200):
         action = rng.integers(4, size=len(cell))
         heading = np.where(live, (heading + (action == 3) - (action == 2)) % 4, heading)
@@ -67,7 +68,7 @@ def test_against_playing_it_out() -> None:
         moves += moving
         hit = moving & goal[cell]
         score[hit] = shortest[hit] / np.maximum(moves, shortest)[hit]
-        live &= ~hit & (moves < cap)
+        live &= ~hit & (moves < limit)
     assert not live.any()
     assert success[start].mean() == pytest.approx((score > 0).mean(), abs=0.01)
     assert spl[start].mean() == pytest.approx(score.mean(), abs=0.008)

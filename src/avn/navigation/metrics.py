@@ -63,7 +63,7 @@ def sna(success: ArrayLike, actions: ArrayLike, fewest: ArrayLike) -> Floats:
 
     Chen et al., "Learning to Set Waypoints for Audio-Visual Navigation", 2021. The column `sna` of
     a run takes a* to the cell of the source, as SoundSpaces does; `sna_goal` takes the fewest
-    actions that succeed, which are fewer, since goal cells lie around the source.
+    actions that succeed, which are usually fewer, since goal cells lie around the source.
 
     Parameters
     ----------
