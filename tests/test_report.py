@@ -214,7 +214,7 @@ def test_what_comes_from_names_is_shown_and_never_run(browser, tmp_path):
         "geodesic": 2.0,
     }
     row |= {"in_sight": 1, "rooms_crossed": 0, "actions": 3, "start_cell": 0, "start_heading": 0}
-    row |= {"success": 1, "spl": 1.0, "softspl": 1.0, "sna": 1.0, "dtg": 0.0}
+    row |= {"success": 1, "spl": 1.0, "softspl": 1.0, "sna": 1.0, "dtg": 0.0, "sna_goal": 1.0}
     episodes = pd.DataFrame([row])
     run = PageRun(evil, evil, evil, True, summarise(episodes), episodes, {0: 0})
     pixel = page_media.view_url(np.zeros((4, 4, 3), dtype=np.uint8))

@@ -51,5 +51,5 @@ def test_random_search_is_as_in_the_paper(rooms):
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_the_oracle_never_fails_and_never_walks_too_far(rooms, name):
     figures = walked(Oracle(), rooms, PROTOCOLS[name], frozen_episodes)
-    found = np.array([figures["sr"], figures["spl"], figures["sna"]])
+    found = np.array([figures["sr"], figures["spl"], figures["sna"], figures["sna_goal"]])
     np.testing.assert_allclose(found, 1.0)
