@@ -346,7 +346,7 @@ def test_a_radius_is_another_goal():
 
 def test_only_products_of_a_radius_depend_on_what_a_radius_means(monkeypatch):
     def fingerprints(protocol):
-        rows = ("agent=ours_noexp", "agent=a3c_va")
+        rows = ("agent=plan_noexp", "agent=a3c_va")
         planner, actor = (composed(row, protocol, "split=mini") for row in rows)
         stages = (StopNetwork(planner), Policy(actor))
         return [stage.fingerprint for stage in stages]

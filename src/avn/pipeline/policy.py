@@ -18,7 +18,7 @@ from avn.core.files import check_name
 from avn.core.progress import log
 from avn.core.settings import plain
 from avn.mapping.ego_map import EgoMap
-from avn.navigation.protocols import GOAL_MEANINGS
+from avn.navigation.protocols import GOAL_MEANINGS, Protocol
 from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.policy_data import (
     SUBSETS,
