@@ -2,10 +2,10 @@
 
     python scripts/ladder.py [KEY=VALUE ...]
 
-The settings are those of `avn.eval` and hold for every line, for example
-`acoustics=diffraction subset=validation`. `seeds=0,1,2` and `train_seeds=0,1,2` name the seeds of the
-episodes and of the networks, of which success rate and SPL are means; both are 0 by default. Runs and
-networks that exist are read.
+The settings are those of `avn.eval` and hold for every line, for example `acoustics=diffraction
+subset=validation`. `seeds=0,1,2` and `train_seeds=0,1,2` name the seeds of the episodes and of the
+networks, of which success rate and SPL are means; both are 0 by default. Runs and networks that
+exist are read.
 """
 
 from __future__ import annotations
