@@ -90,7 +90,8 @@ def find_readers(keys: Mapping[str, Sequence[str]], values: Mapping[str, Sequenc
         Overrides of each group that set a key to another of its values.
     """
     readers = Readers()
-    runs = [("eval", f"agent={row}") for row in options_of("agent")]
+    # `plan_*` before `ours_*`, whose settings make others unread
+    runs = [("eval", f"agent={row}") for row in reversed(options_of("agent"))]
     runs.append(("eval", "agent=external", f"baseline.observations=[{','.join(OBSERVATIONS)}]"))
     runs += [("train", f"model={model}") for model in options_of("model")]
     unseen = {group: set(options_of(group)) for group in keys}

@@ -38,7 +38,7 @@ def records(
     frame["geodesic"] = 1.0 + frame["start_cell"] + frame["source"]
     rng = np.random.default_rng([seed, draw, *agent.encode()])
     frame["success"] = (rng.random(len(frame)) < rate).astype(int)
-    for column in ("spl", "softspl", "sna"):
+    for column in ("spl", "softspl", "sna", "sna_goal"):
         frame[column] = frame["success"] * (0.5 + 0.5 * rng.random(len(frame)))
     frame["dtg"] = 5 * rng.random(len(frame))
     frame["outcome"] = np.where(frame["success"] == 1, "success", "out_of_moves")

@@ -55,7 +55,7 @@ def test_a_run_is_replayed_from_its_config(command, outputs, agent):
     assert (traces[0].source_estimates is None) == (
         agent not in ("greedy", "plan_noexp", "plan_exp")
     )
-    assert (traces[0].beliefs is None) == (not agent.startswith("ours"))
+    assert (traces[0].beliefs is None) == (not agent.startswith("plan"))
     assert (traces[0].exploration_trajectory is None) == (
         agent not in ("plan_exp", "a3c_va_m_mapper")
     )

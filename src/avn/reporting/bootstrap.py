@@ -22,7 +22,6 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, stdtrit
 
 Floats: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
@@ -239,6 +238,8 @@ def _drawn(pools: Floats, parent: Integers, draws: int, rng: np.random.Generator
 
 def _ends(means: Floats, mean: Floats, error: Floats, df: Floats) -> tuple[Floats, Floats]:
     """Return lower and upper ends, (M,) each, from resampled means (draws, M)."""
+    from scipy.special import ndtr, stdtrit  # not needed to show a finished run
+
     spread = means.std(axis=0)
     ends = np.stack((mean, mean))  # of a metric that does not vary
     for column in np.flatnonzero(spread > 1e-12 * np.maximum(1.0, np.abs(mean))):

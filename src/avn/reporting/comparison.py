@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtrit
 
 from avn.reporting.bootstrap import DRAWS, LEVEL, MIN_GROUPS, Floats, estimate
 from avn.reporting.nesting import NETWORK, nested
@@ -154,5 +153,7 @@ def detectable(error: Floats, df: Floats) -> Floats:
     df : (M,) float64
         Degrees of freedom of the errors.
     """
+    from scipy.special import stdtrit  # not needed to show a finished run
+
     multiple = stdtrit(df, 0.5 + LEVEL / 2) + stdtrit(df, POWER)
     return np.asarray(multiple * error, dtype=np.float64)
