@@ -97,9 +97,10 @@ def find_readers(keys: Mapping[str, Sequence[str]], values: Mapping[str, Sequenc
     unseen = {group: set(options_of(group)) for group in keys}
     kinds: dict[frozenset[str], tuple[str, ...]] = {}
     for run in [*runs, ("generate",)]:
-        for group in keys:
-            unseen[group].discard(composed(*run).hydra.runtime.choices[group])
         kinds.setdefault(frozenset(readers.add(run)), run)
+        for group in keys:
+            if group in readers.nodes[run]:
+                unseen[group].discard(composed(*run).hydra.runtime.choices[group])
     largest = [run for names, run in kinds.items() if not any(names < own for own in kinds)]
     rounds = in_rounds(unseen)
     for run in largest:

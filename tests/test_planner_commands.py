@@ -1,10 +1,11 @@
-"""The paper's two rows on the real pipeline, with the mini split and small pictures."""
+"""The paper's two rows and ours on the real pipeline, with the mini split and small pictures."""
 
 from pathlib import Path
 
 import h5py
 import pandas as pd
 import pytest
+from omegaconf import OmegaConf
 from small import EYES, SMALL, fitting
 
 # One take of each clip of one sound.
@@ -36,6 +37,24 @@ def test_it_sees_hears_maps_and_walks(command, outputs, protocol):
     if protocol == "stop":
         # Whatever its network is worth after one epoch: who did not say Stop ran out of actions.
         assert set(episodes["outcome"]) <= {"success", "stopped_elsewhere", "out_of_actions"}
+
+
+@pytest.mark.parametrize("row", ["ours_noexp", "ours_exp"])
+def test_the_rows_of_the_paper_walk_and_say_stop(command, outputs, row):
+    code, out, err = ours(command, outputs, f"agent={row}", "protocol=var_stop")
+    assert code == 0, err
+    episodes = records(out)
+    assert set(episodes["agent"]) == {row}
+    cfg = OmegaConf.load(Path(out[-1]) / "config.yaml")
+    assert (cfg.planner.collision_cost, cfg.planner.source_filter) == (0.0, "latest")
+    assert cfg.sound_model.flip_tta is cfg.occupancy_model.get("flip_tta", False) is False
+    assert cfg.planner.obstacle_threshold == (0.5 if row == "ours_noexp" else 0.6)
+    if row == "ours_exp":
+        assert (cfg.mapper.localisation, cfg.mapper.grows, cfg.mapper.top) == (
+            "retrieval",
+            False,
+            3,
+        )
 
 
 def test_a_run_made_again_has_the_same_bytes(command, outputs):

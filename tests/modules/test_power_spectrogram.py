@@ -29,3 +29,5 @@ def test_it_is_the_log_spectrogram_without_logarithm() -> None:
     ratio = linear / 10 ** (log - 4.0)
     assert torch.allclose(ratio, ratio[0, 0, 0, 0].expand_as(ratio), rtol=1e-3)
     assert torch.equal(power.mirror(linear), linear.flip(1))
+    logarithm = PowerSpectrogram(8000, bands=32, frames=40, log=True)(clips)
+    assert torch.allclose(logarithm, torch.log10(linear), atol=1e-4)

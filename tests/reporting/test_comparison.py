@@ -9,7 +9,9 @@ from scipy import stats
 from avn.core.errors import UserError
 from avn.reporting.bootstrap import Nested, estimate
 from avn.reporting.comparison import compare, detectable, mcnemar
+from avn.reporting.comparison_table import NAMES
 from avn.reporting.pairing import paired
+from avn.reporting.results import METRICS
 
 
 def rows(found):
@@ -75,6 +77,10 @@ def test_few_apartments_have_a_difference_without_interval():
     few = compare(records("one", scenes=3), records("two", scenes=3))
     assert rows(few)[["low", "high", "detectable"]].isna().all(axis=None)
     assert rows(few)["difference"].notna().all()
+
+
+def test_every_metric_has_a_name():
+    assert set(NAMES) == set(METRICS)
 
 
 def test_one_apartment_speaks_of_itself():

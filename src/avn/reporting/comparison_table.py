@@ -12,8 +12,15 @@ from rich.table import Table
 from avn.reporting.comparison import INDEPENDENT, Comparison, McNemar
 from avn.reporting.results import NO_INTERVAL
 
-# Names of the metrics; all but the last are in percent.
-NAMES = {"sr": "success", "spl": "SPL", "softspl": "SoftSPL", "sna": "SNA", "dtg": "distance, m"}
+# Names of the metrics; all but the distance are in percent.
+NAMES = {
+    "sr": "success",
+    "spl": "SPL",
+    "softspl": "SoftSPL",
+    "sna": "SNA",
+    "dtg": "distance, m",
+    "sna_goal": "SNA to the goal",
+}
 _METRES = "dtg"
 
 
