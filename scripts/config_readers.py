@@ -99,8 +99,11 @@ def find_readers(keys: Mapping[str, Sequence[str]], values: Mapping[str, Sequenc
     for run in [*runs, ("generate",)]:
         kinds.setdefault(frozenset(readers.add(run)), run)
         for group in keys:
-            if group in readers.nodes[run]:
-                unseen[group].discard(composed(*run).hydra.runtime.choices[group])
+            cfg = composed(*run)
+            # a part that a row has and does not read, such as a stop classifier without Stop
+            spare = group in cfg and "_target_" in cfg[group] and cfg[group]["_target_"]
+            if group in readers.nodes[run] or not spare:
+                unseen[group].discard(cfg.hydra.runtime.choices[group])
     largest = [run for names, run in kinds.items() if not any(names < own for own in kinds)]
     rounds = in_rounds(unseen)
     for run in largest:
