@@ -106,7 +106,9 @@ def test_figures_are_rounded_once_and_the_papers_stand_where_they_belong(browser
             cell = shown.locator("td.cell[data-scene=room_1]")
             assert cell.locator("b").inner_text() == "100.0 / 15.1"  # not 15.15, then 15.2
             assert "15–15" in cell.inner_text()
-            assert ("paper 12.0 / 10.5" in cell.inner_text()) == bool(paper)
+            assert "paper" not in cell.inner_text()  # whose rooms are not ours
+            average = shown.locator("td.cell[data-scene=average]")
+            assert ("paper 12.4 / 11.1" in average.inner_text()) == bool(paper)
             assert "Protocol x." in shown.locator("header").inner_text()
 
 

@@ -56,8 +56,8 @@ def test_table_has_a_row_for_each_sound_and_a_column_for_each_room() -> None:
 def test_the_papers_own_figures_stand_below_ours() -> None:
     lines = printed(results("greedy"), paper={"greedy": WHOLE})
     assert cells(lines, "Gan et al. 2020") == [
-        ["12.0/10.5", "15.0/13.5", "12.4/11.1"],
-        ["11.3/10.2", "14.3/12.7", "11.7/10.4"],
+        ["12.4/11.1"],
+        ["11.7/10.4"],
     ]
     order = [line.split()[0] for line in lines if line][2:7]
     assert order == ["greedy", "ring", "Gan", "all", "Gan"]

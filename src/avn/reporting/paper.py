@@ -26,7 +26,9 @@ def paper_table() -> pd.DataFrame:
 
 
 def paper_results(sounds: Mapping[str, Collection[str]]) -> pd.DataFrame:
-    """Return the paper's results for some agents and sounds, in the form of `paper_table`.
+    """Return the paper's averages for some agents and sounds, in the form of `paper_table`.
+
+    Its single apartments are none of ours, so their results stand beside no other.
 
     Parameters
     ----------
@@ -34,6 +36,7 @@ def paper_results(sounds: Mapping[str, Collection[str]]) -> pd.DataFrame:
         Sounds by agent; `all` is the mean over the paper's three sounds.
     """
     table = paper_table()
+    table = table[table["scene"] == AVERAGE]
     means = table.groupby(["agent", "scene"], as_index=False)[["sr", "spl"]].mean()
     table = pd.concat([table, means.assign(sound=ALL_SOUNDS)], ignore_index=True)
     pairs = zip(table["agent"], table["sound"], strict=True)
@@ -49,7 +52,7 @@ def paper_averages(sounds: Mapping[str, Collection[str]]) -> dict[str, tuple[flo
         As for `paper_results`; agents without `all` are left out.
     """
     table = paper_results(sounds)
-    average = table[(table["scene"] == AVERAGE) & (table["sound"] == ALL_SOUNDS)]
+    average = table[table["sound"] == ALL_SOUNDS]
     return {
         str(row["agent"]): (float(row["sr"]), float(row["spl"]))
         for row in average.to_dict("records")
