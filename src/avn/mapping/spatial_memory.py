@@ -40,6 +40,7 @@ class SpatialMemory:
             raise UserError(f"mapper.top: {top}; give 1 or more entries")
         self.top, self.trajectory_index = top, trajectory_index
         self._keys, self._values = keys, values
+        self._empty = (keys == 0).all(dim=-1)  # rows of padding
         n, features = len(trajectory_index), keys.shape[-1]
         self._own_keys = torch.zeros(n, 0, features)
         self._own_values = torch.zeros(n, 0, 3, dtype=torch.int64)
@@ -83,8 +84,7 @@ class SpatialMemory:
         """
         places = self._values[self.trajectory_index, :, :2]
         away = (places - location[:, None]).square().sum(dim=-1)
-        # rows of padding come last and have zeros as keys
-        empty = (self._keys[self.trajectory_index] == 0).all(dim=-1)
+        empty = self._empty[self.trajectory_index]
         index = away.masked_fill(empty, torch.inf).argmin(dim=1)
         return places[torch.arange(len(places)), index]
 
