@@ -33,6 +33,7 @@ FURNITURE_KINDS = (
     "coffee_table",
     "counter",
     "cupboard",
+    "curtain",
     "desk",
     "dining_table",
     "dresser",

@@ -112,6 +112,9 @@ BATHTUB = Model("bathtub", 1.7, 0.72, 0.58, "ceramic")
 SHOWER = Model("shower", 0.8, 0.8, 2.0, "glass")
 WASHING_MACHINE = Model("washing_machine", 0.6, 0.6, 0.85, "metal")
 BATH_CABINET = Model("bath_cabinet", 0.4, 0.3, 1.6, "laminate")
+# An open curtain, and the widths that it may have.
+CURTAIN = Model("curtain", 0.6, 0.1, 2.48, "fabric", z=0.02)
+CURTAIN_WIDTHS = (0.6, 0.5, 0.4, 0.3)
 FRONT_DOOR = Model("front_door", 0.9, 0.05, 2.05, "wood")
 
 

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from avn.apartments import furniture
+from avn.apartments.curtains import hang_curtains
 from avn.apartments.floor_plan import WALL_THICKNESS, FloorPlan, Lamp, Piece
 from avn.apartments.furniture import Part
 from avn.apartments.grid import build_grid
-from avn.apartments.layout import draw_layout, outer_spans
+from avn.apartments.layout import FINISH, SOFT_FINISH, draw_layout, outer_spans
 from avn.apartments.placement import DOOR_CLEARANCE, Furnisher, Spot, overlap
-from avn.apartments.rooms import FURNISH
+from avn.apartments.rooms import FURNISH, add_soft_pieces
 from avn.apartments.sources import spread_sources
 from avn.core.errors import UserError
+from avn.core.random import Draws, Rng, derive
 
 LAMP_HEIGHT = 2.35
 # Draws of layouts before the generator gives up; about one in fifty is valid.
@@ -33,10 +36,14 @@ class Size:
         Number of rooms, fewest and most grid squares; one choice is drawn.
     richness : (float, float)
         Range of the amount of furniture, from 0 (the indispensable pieces) to 1.
+    soft : bool
+        True for homes with soft furnishing: carpets in most rooms, and curtains. They are drawn
+        from streams that depend on no version of NumPy.
     """
 
     choices: tuple[tuple[int, int, int], ...]
     richness: tuple[float, float] = (0.0, 1.0)
+    soft: bool = False
 
 
 SIZES = {
@@ -44,6 +51,7 @@ SIZES = {
     "mixed": Size(((3, 85, 125), (4, 130, 190), (5, 150, 200))),
     "large": Size(((4, 150, 200), (5, 150, 200))),
     "roomy": Size(((4, 175, 200), (5, 180, 200)), (0.05, 0.7)),
+    "homes": Size(((3, 85, 125), (4, 130, 190), (5, 150, 200)), richness=(0.1, 1.0), soft=True),
     "airy": Size(((4, 196, 200),), (0.0, 0.06)),
 }
 
@@ -54,6 +62,8 @@ def generate(
     sources: int = 5,
     size: str = "mixed",
     accepts: Callable[[FloorPlan], bool] | None = None,
+    skip: int = 0,
+    tally: Counter[str] | None = None,
 ) -> FloorPlan:
     """Draw an apartment.
 
@@ -69,6 +79,12 @@ def generate(
         A key of `SIZES`.
     accepts : callable, optional
         Test of a layout: a plan without furniture. Layouts that it rejects are drawn again.
+    skip : int
+        Number of draws to leave out that are known to give no valid apartment, to save time; for
+        sizes with soft furnishing.
+    tally : Counter, optional
+        Counts the draws by outcome: no `layout` that is valid, one that is not `accepted`, no
+        valid `furnishing`, `whole`.
 
     Raises
     ------
@@ -80,16 +96,23 @@ def generate(
         raise UserError(f"split.size is '{size}'; choose one of {', '.join(SIZES)}")
     if sources < 1:
         raise UserError(f"split: {sources} sources an apartment; ask for at least 1")
-    rng = np.random.default_rng([seed, 20_240])
-    choices = SIZES[size].choices
+    soft, choices = SIZES[size].soft, SIZES[size].choices
+    finish = SOFT_FINISH if soft else FINISH
+    rng: Rng = Draws(seed) if soft else np.random.default_rng([seed, 20_240])
     count, fewest, most = choices[int(rng.integers(len(choices)))]
     richness = float(rng.uniform(*SIZES[size].richness))
-    for _ in range(_DRAWS):
-        plan = draw_layout(name, count, (fewest, most), rng)
-        if plan is None or (accepts is not None and not accepts(plan)):
-            continue
-        plan = _furnish(plan, richness, rng)
+    for number in range(skip, _DRAWS):
+        if soft:  # each draw has a stream of its own, so that draws can be skipped
+            rng = Draws(derive("draw", seed, number))
+        plan, outcome = draw_layout(name, count, (fewest, most), rng, finish), "layout"
+        if plan is not None and (accepts is None or accepts(plan)):
+            plan, outcome = _furnish(plan, richness, rng, soft), "furnishing"
+        elif plan is not None:
+            plan, outcome = None, "accepted"
+        if tally is not None:
+            tally["whole" if plan is not None else outcome] += 1
         if plan is not None:
+            plan = hang_curtains(plan, rng) if soft else plan
             return _with_sources(plan, sources, rng)
     raise UserError(
         f"split: no new layout of size {size} found for apartment {name}; take another "
@@ -97,7 +120,7 @@ def generate(
     )
 
 
-def _furnish(plan: FloorPlan, richness: float, rng: np.random.Generator) -> FloorPlan | None:
+def _furnish(plan: FloorPlan, richness: float, rng: Rng, soft: bool) -> FloorPlan | None:
     """Furnish every room; return None if a room cannot be furnished or cells are not connected."""
     with_table = _dining_room(plan)
     pieces: list[Piece] = []
@@ -112,6 +135,8 @@ def _furnish(plan: FloorPlan, richness: float, rng: np.random.Generator) -> Floo
                 break
         else:
             return None
+        if soft:
+            add_soft_pieces(furnisher, room.kind)
         pieces += furnisher.pieces
     lamps = tuple(Lamp((r.x0 + r.x1) / 2, (r.y0 + r.y1) / 2, LAMP_HEIGHT) for r in plan.rooms)
     plan = replace(plan, furniture=tuple(pieces), lamps=lamps)
@@ -164,6 +189,6 @@ def _front_door(plan: FloorPlan, furnisher: Furnisher) -> bool:
     return True
 
 
-def _with_sources(plan: FloorPlan, count: int, rng: np.random.Generator) -> FloorPlan:
+def _with_sources(plan: FloorPlan, count: int, rng: Rng) -> FloorPlan:
     grid = build_grid(plan)
     return replace(plan, sources=tuple(spread_sources(plan, grid, count, rng)))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
 
 from avn.apartments.floor_plan import CELL, Doorway, FloorPlan, Room, Window
+from avn.core.random import Rng
 
 Rect = tuple[int, int, int, int]
 Edge = tuple[int, int]
+# Materials of the floors and of the walls of each kind of room; one of each is drawn.
+Finish = Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
@@ -42,11 +46,17 @@ KINDS = {
     4: ("living_room", "kitchen", "bedroom", "bathroom"),
     5: ("living_room", "kitchen", "bedroom", "bedroom", "bathroom"),
 }
-FINISH = {
+FINISH: Finish = {
     "bathroom": (("floor_tiles",), ("wall_tiles",)),
     "kitchen": (("floor_tiles", "parquet"), ("plaster", "plaster", "painted_brick")),
     "bedroom": (("parquet", "carpet"), ("plaster",)),
     "living_room": (("parquet", "parquet", "carpet"), ("plaster", "plaster", "painted_brick")),
+}
+# Homes with soft furnishing: most bedrooms and living rooms have a carpet.
+SOFT_FINISH: Finish = {
+    **FINISH,
+    "bedroom": (("parquet", *("carpet",) * 7), ("plaster",)),
+    "living_room": (("parquet", *("carpet",) * 4), ("plaster", "plaster", "painted_brick")),
 }
 # Cost of a door between two kinds of room; other pairs never have one.
 DOOR_COST = {
@@ -66,7 +76,7 @@ WINDOWS = {
 }
 
 
-def _split(rects: list[Rect], leaves: int, rng: np.random.Generator) -> list[Rect] | None:
+def _split(rects: list[Rect], leaves: int, rng: Rng) -> list[Rect] | None:
     """Split a rectangle at random into `leaves` rectangles with sides of at least 2 m."""
     while len(rects) < leaves:
         weights = [((r[2] - r[0]) * (r[3] - r[1])) ** 2 for r in rects]
@@ -89,7 +99,7 @@ def _corner(rect: Rect, width: int, height: int) -> bool:
     return (rect[0] == 0 or rect[2] == width) and (rect[1] == 0 or rect[3] == height)
 
 
-def _shapes(count: int, squares: tuple[int, int], rng: np.random.Generator) -> list[Rect] | None:
+def _shapes(count: int, squares: tuple[int, int], rng: Rng) -> list[Rect] | None:
     """Draw rectangles that tile a rectangle or an L; return None if the draw does not fit."""
     l_shaped = bool(rng.random() < 0.5)
     # Walls take about a quarter of all squares, and the corner left out of an L some more.
@@ -110,7 +120,7 @@ def _shapes(count: int, squares: tuple[int, int], rng: np.random.Generator) -> l
     return rects if squares[0] <= total <= squares[1] else None
 
 
-def _kinds(rects: list[Rect], rng: np.random.Generator) -> list[str] | None:
+def _kinds(rects: list[Rect], rng: Rng) -> list[str] | None:
     fitting = sorted(
         {
             order
@@ -172,7 +182,7 @@ def _layout_cost(tree: tuple[Edge, ...], kinds: list[str]) -> float:
 
 
 def _doorways(
-    rects: list[Rect], kinds: list[str], rng: np.random.Generator
+    rects: list[Rect], kinds: list[str], rng: Rng
 ) -> list[Doorway] | None:
     shared = {
         (a, b): wall
@@ -224,7 +234,7 @@ def outer_spans(room: Room, rooms: tuple[Room, ...]) -> list[tuple[str, float, f
     return spans
 
 
-def _windows(rooms: tuple[Room, ...], rng: np.random.Generator) -> list[Window] | None:
+def _windows(rooms: tuple[Room, ...], rng: Rng) -> list[Window] | None:
     windows = []
     for room in rooms:
         width, sill, height = WINDOWS[room.kind]
@@ -240,7 +250,7 @@ def _windows(rooms: tuple[Room, ...], rng: np.random.Generator) -> list[Window] 
 
 
 def draw_layout(
-    name: str, count: int, squares: tuple[int, int], rng: np.random.Generator
+    name: str, count: int, squares: tuple[int, int], rng: Rng, finish: Finish = FINISH
 ) -> FloorPlan | None:
     """Draw rooms, doorways and windows.
 
@@ -252,8 +262,10 @@ def draw_layout(
         Number of rooms, 3 to 5.
     squares : (int, int)
         Fewest and most grid squares of the whole apartment.
-    rng : Generator
+    rng : Generator or Draws
         Random numbers.
+    finish : mapping
+        Materials to draw, by kind of room: floors, walls.
 
     Returns
     -------
@@ -269,7 +281,7 @@ def draw_layout(
         return None
     rooms = []
     for kind, rect in zip(kinds, rects, strict=True):
-        floors, walls = FINISH[kind]
+        floors, walls = finish[kind]
         x0, y0, x1, y1 = (v * CELL for v in rect)
         floor, wall = str(rng.choice(floors)), str(rng.choice(walls))
         rooms.append(Room(kind, x0, y0, x1, y1, floor, wall, "ceiling_plaster"))

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from avn.apartments.floor_plan import CELL, DOOR_WIDTH, WALL_THICKNESS, FloorPlan, Piece, Room
 from avn.apartments.furniture import Group, Part, Rect
 from avn.apartments.grid import free_squares
+from avn.core.random import Rng
 
 # Depth of the free floor on either side of a doorway, for the leaf of the door; metres.
 DOOR_CLEARANCE = 0.9
@@ -82,11 +83,11 @@ class Furnisher:
         Doorways and windows keep floor free; furniture of the plan is ignored.
     room : Room
         Room of the plan.
-    rng : Generator
+    rng : Generator or Draws
         Random numbers.
     """
 
-    def __init__(self, plan: FloorPlan, room: Room, rng: np.random.Generator) -> None:
+    def __init__(self, plan: FloorPlan, room: Room, rng: Rng) -> None:
         half = WALL_THICKNESS / 2
         self.rng = rng
         self.floor: Rect = (room.x0 + half, room.y0 + half, room.x1 - half, room.y1 - half)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from avn.apartments import furniture as f
 from avn.apartments.furniture import Group, Model
 from avn.apartments.placement import Furnisher
+from avn.core.random import Rng
 
 # Largest distance from wall to wall between a sofa and a television, metres.
 _VIEWING = 4.6
@@ -16,7 +15,7 @@ _VIEWING = 4.6
 LEAN = 0.1
 
 
-def _pick(rng: np.random.Generator, *options: Group) -> list[Group]:
+def _pick(rng: Rng, *options: Group) -> list[Group]:
     """Shuffle the options, to be tried until one fits."""
     return [options[i] for i in rng.permutation(len(options))]
 
@@ -193,6 +192,12 @@ def furnish_bathroom(room: Furnisher, richness: float, dining: bool) -> bool:
     _maybe(room, [f.single(f.WASHING_MACHINE, 0.5, corner=1.0)], 0.8 * richness)
     _maybe(room, [f.single(f.BATH_CABINET, 0.4, corner=1.0)], 0.6 * richness)
     return True
+
+
+def add_soft_pieces(room: Furnisher, kind: str) -> None:
+    """Add a reading chair to most bedrooms and living rooms in which one fits."""
+    if kind in ("bedroom", "living_room"):
+        _maybe(room, [f.single(f.ARMCHAIR, 0.5, corner=1.0)], 0.6)
 
 
 FURNISH: dict[str, Callable[[Furnisher, float, bool], bool]] = {

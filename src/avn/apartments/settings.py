@@ -26,6 +26,9 @@ class SplitConfig:
         Number of apartments to generate.
     train_sources, sources : int
         Number of source cells of each training apartment, and of each other one.
+    hashes : str, optional
+        Generated apartments that are frozen: a table of hashes of floor plans in the package's
+        `assets/floor_plan_hashes`. An apartment with another hash is refused. null for none.
     total_steps, validate_every : int
         Defaults of `algorithm.total_steps` and `algorithm.validate_every` of `algorithm=a3c` for
         agents that are trained on this split.
@@ -40,5 +43,6 @@ class SplitConfig:
     test: int = 5
     train_sources: int = 10
     sources: int = 5
+    hashes: str | None = None
     total_steps: int = 3_000_000
     validate_every: int = 250_000

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import Grid, goal_cells
 from avn.core.errors import UserError
+from avn.core.random import Rng
 
 # Least distance between two sources where cells allow it, metres.
 APART = 1.5
@@ -16,7 +17,7 @@ _OPEN = 8
 
 
 def spread_sources(
-    plan: FloorPlan, grid: Grid, count: int, rng: np.random.Generator
+    plan: FloorPlan, grid: Grid, count: int, rng: Rng
 ) -> list[tuple[float, float]]:
     """Draw cells for sources: in every room if there are enough, far from one another.
 
@@ -31,7 +32,7 @@ def spread_sources(
         Its cells.
     count : int
         Number of sources.
-    rng : Generator
+    rng : Generator or Draws
         Random numbers.
 
     Returns
@@ -83,7 +84,7 @@ def _choose(
     chosen: list[int],
     grid: Grid,
     openness: NDArray[np.int64],
-    rng: np.random.Generator,
+    rng: Rng,
 ) -> int:
     """Draw a cell far enough from the chosen ones and with free cells around it, if any."""
     nearest = np.full(len(cells), np.inf)
@@ -93,4 +94,4 @@ def _choose(
     far = nearest >= APART if (nearest >= APART).any() else nearest == nearest.max()
     cells = cells[far]
     wanted = min(_OPEN, openness[cells].max())
-    return int(rng.choice(cells[openness[cells] >= wanted]))
+    return int(rng.choice(cells[openness[cells] >= wanted].tolist()))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.floor_plan_file import load
+from avn.apartments.frozen_hashes import check_hash, check_settings, frozen_apartments
 from avn.apartments.generator import SIZES, generate
 from avn.apartments.settings import SplitConfig
 from avn.apartments.symmetry import Key, layout_key
@@ -19,7 +22,7 @@ FROZEN = Path(__file__).parents[1] / "assets" / "floor_plans"
 DEFAULTS = ("total_steps", "validate_every")
 
 
-def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
+def load_split(cfg: SplitConfig) -> Mapping[str, list[FloorPlan]]:
     """Read or generate the apartments of a split.
 
     Parameters
@@ -29,10 +32,12 @@ def load_split(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
 
     Returns
     -------
-    dict of list of FloorPlan
+    mapping of list of FloorPlan
         Under `train`, `validation` and `test`; a folder may have apartments of some parts only.
-        Layouts of generated apartments are unique, also up to rotation and mirroring; each layout
-        is reserved for one part, in all generated splits.
+        Generated apartments are drawn when their part is asked for.
+        Each layout is reserved for one part, in all generated splits. Within a part, layouts of
+        generated apartments are unique, also up to rotation and mirroring; those of `homes` are
+        not made to be, so that an apartment depends on its number alone.
 
     Raises
     ------
@@ -85,7 +90,29 @@ def _part_of_file(path: Path) -> str:
     return parts.get(word, "test")
 
 
-def _generated(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
+class _Generated(Mapping[str, list[FloorPlan]]):
+    """Generated apartments; those of a part are drawn when the part is asked for."""
+
+    def __init__(self, cfg: SplitConfig) -> None:
+        self._cfg = cfg
+        self._drawn: dict[str, list[FloorPlan]] = {}
+
+    def __getitem__(self, part: str) -> list[FloorPlan]:
+        """Return the apartments of a part."""
+        if part not in self._drawn and part in PARTS:
+            self._drawn[part] = _generated_part(self._cfg, part)
+        return self._drawn[part]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the parts."""
+        return iter(PARTS)
+
+    def __len__(self) -> int:
+        """Return the number of parts."""
+        return len(PARTS)
+
+
+def _generated(cfg: SplitConfig) -> _Generated:
     if cfg.size not in SIZES:
         raise UserError(f"split.size is '{cfg.size}'; choose one of {', '.join(SIZES)}")
     for key in ("train", "validation", "test", "train_sources", "sources"):
@@ -93,25 +120,61 @@ def _generated(cfg: SplitConfig) -> dict[str, list[FloorPlan]]:
             raise UserError(f"split.{key} is {getattr(cfg, key)}; give at least 1")
     if cfg.seed < 0:
         raise UserError(f"split.seed is {cfg.seed}; give 0 or more")
-    return {part: _generated_part(cfg, part) for part in PARTS}
+    check_settings(cfg)
+    return _Generated(cfg)
 
 
 def _generated_part(cfg: SplitConfig, part: str) -> list[FloorPlan]:
-    """Generate the apartments of a part; each depends on those before it in the part, if at all."""
-    name = {"train": "train", "validation": "val", "test": "room"}[part]
-    sources = cfg.train_sources if part == "train" else cfg.sources
+    """Generate the apartments of a part.
+
+    Each depends on its number alone, and where a layout comes again, on those before it. A size
+    with soft furnishing has layouts that come again as they are, so that none is selected.
+    """
     seen: set[Key] = set()
+    plans = []
+    frozen = frozen_apartments(cfg, part)
+    for index in range(getattr(cfg, part)):
+        skip = frozen[index].skip if frozen else 0
+        plans.append(draw_apartment(cfg, part, index, seen, skip))
+        if frozen:
+            check_hash(plans[-1], frozen[index], str(cfg.hashes))
+        if not SIZES[cfg.size].soft:
+            seen.add(layout_key(plans[-1]))
+    return plans
+
+
+def draw_apartment(
+    cfg: SplitConfig,
+    part: str,
+    index: int,
+    seen: Collection[Key] = (),
+    skip: int = 0,
+    tally: Counter[str] | None = None,
+) -> FloorPlan:
+    """Generate one apartment of a split.
+
+    Parameters
+    ----------
+    cfg : SplitConfig
+        Settings.
+    part : {"train", "validation", "test"}
+        Its part.
+    index : int
+        Its number in the part, from 0.
+    seen : collection of Key
+        Layouts that it must not have, of `layout_key`.
+    skip, tally
+        As in `generate`.
+    """
 
     def is_new(layout: FloorPlan) -> bool:
         key = layout_key(layout)
         return key not in seen and part_of_layout(key) == part
 
-    plans = []
-    for index in range(getattr(cfg, part)):
-        seed = derive("apartment", cfg.seed, part, index)
-        plans.append(generate(seed, f"{name}_{index + 1}", sources, cfg.size, is_new))
-        seen.add(layout_key(plans[-1]))
-    return plans
+    name = {"train": "train", "validation": "val", "test": "room"}[part]
+    sources = cfg.train_sources if part == "train" else cfg.sources
+    seed = derive("apartment", cfg.seed, part, index)
+    return generate(seed, f"{name}_{index + 1}", sources, cfg.size, is_new, skip, tally)
 
 
 def part_of_layout(key: Key) -> str:

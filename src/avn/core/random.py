@@ -9,6 +9,8 @@ SHA-256 hash of the names.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 _GAMMA = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
+_ALL = 2**64 - 1
+T = TypeVar("T")
 
 
 def derive(*names: object) -> int:
@@ -49,3 +53,58 @@ def scramble(key: ArrayLike, index: ArrayLike) -> NDArray[np.uint64]:
 def uniform(key: ArrayLike, index: ArrayLike) -> NDArray[np.float64]:
     """Return numbers in [0, 1) of the streams of `key`, with 53 random bits each."""
     return (scramble(key, index) >> np.uint64(11)).astype(np.float64) * 2.0**-53
+
+
+class Draws:
+    """Stream of random numbers with the methods of a NumPy generator that apartments are drawn by.
+
+    The n-th number is `scramble(key, n)`, in integers of Python. NumPy keeps the bits of its
+    generators over versions, but not what `choice`, `integers` or `shuffle` make of them.
+
+    Parameters
+    ----------
+    key : int
+        Key of the stream, as of `derive`.
+    """
+
+    def __init__(self, key: int) -> None:
+        self._state = key & _ALL
+
+    def bits(self) -> int:
+        """Return the next number, uniform over all 64-bit integers."""
+        self._state = x = (self._state + int(_GAMMA)) & _ALL
+        x = ((x ^ (x >> 30)) * int(_MIX_1)) & _ALL
+        x = ((x ^ (x >> 27)) * int(_MIX_2)) & _ALL
+        return x ^ (x >> 31)
+
+    def random(self) -> float:
+        """Draw a number in [0, 1), a multiple of 2 ** -53."""
+        return (self.bits() >> 11) * 2.0**-53
+
+    def uniform(self, low: float, high: float) -> float:
+        """Draw a number in [low, high)."""
+        return low + (high - low) * self.random()
+
+    def integers(self, low: int, high: int | None = None) -> int:
+        """Draw an integer in [0, low), or in [low, high)."""
+        first, after = (0, low) if high is None else (low, high)
+        return first + (self.bits() * (after - first) >> 64)
+
+    def choice(self, values: Sequence[T]) -> T:
+        """Draw one of the values."""
+        return values[self.integers(len(values))]
+
+    def permutation(self, count: int) -> list[int]:
+        """Draw an order of 0, ..., count - 1."""
+        order = list(range(count))
+        self.shuffle(order)
+        return order
+
+    def shuffle(self, values: list[T]) -> None:
+        """Shuffle a list in place (Fisher and Yates)."""
+        for last in range(len(values) - 1, 0, -1):
+            other = self.integers(last + 1)
+            values[last], values[other] = values[other], values[last]
+
+
+Rng = np.random.Generator | Draws

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from avn.apartments.floor_plan import FloorPlan
+from avn.apartments.frozen_hashes import floor_plan_hash
 from avn.apartments.grid import build_grid
 from avn.apartments.settings import SplitConfig
 from avn.apartments.splits import DEFAULTS, PARTS, load_split
@@ -124,12 +125,12 @@ def apartments_of_all_subsets(cfg: DictConfig, world: WorldKeys = TEST) -> list[
     return [Apartments(cfg, subset, world) for subset in PARTS if split[subset]]
 
 
-_READ: dict[str, dict[str, list[FloorPlan]]] = {}
+_READ: dict[str, Mapping[str, list[FloorPlan]]] = {}
 _CELLS: dict[str, int] = {}
 _HASHES: dict[int, tuple[FloorPlan, str]] = {}
 
 
-def _plans(split: DictConfig) -> dict[str, list[FloorPlan]]:
+def _plans(split: DictConfig) -> Mapping[str, list[FloorPlan]]:
     # stages ask for the same plans many times in one command
     key = OmegaConf.to_yaml(split, resolve=True)
     if key not in _READ:
@@ -140,7 +141,7 @@ def _plans(split: DictConfig) -> dict[str, list[FloorPlan]]:
 def plan_hash(plan: FloorPlan) -> str:
     """Return the SHA-256 of a floor plan, in hex."""
     if id(plan) not in _HASHES:
-        _HASHES[id(plan)] = (plan, digest(plan.to_dict()))  # the plan, so that its id stays its own
+        _HASHES[id(plan)] = (plan, floor_plan_hash(plan))  # the plan, so that its id stays its own
     return _HASHES[id(plan)][1]
 
 
