@@ -181,9 +181,7 @@ def _layout_cost(tree: tuple[Edge, ...], kinds: list[str]) -> float:
     return cost if cost <= 3.5 else np.inf
 
 
-def _doorways(
-    rects: list[Rect], kinds: list[str], rng: Rng
-) -> list[Doorway] | None:
+def _doorways(rects: list[Rect], kinds: list[str], rng: Rng) -> list[Doorway] | None:
     shared = {
         (a, b): wall
         for a, b in combinations(range(len(rects)), 2)

@@ -16,9 +16,7 @@ APART = 1.5
 _OPEN = 8
 
 
-def spread_sources(
-    plan: FloorPlan, grid: Grid, count: int, rng: Rng
-) -> list[tuple[float, float]]:
+def spread_sources(plan: FloorPlan, grid: Grid, count: int, rng: Rng) -> list[tuple[float, float]]:
     """Draw cells for sources: in every room if there are enough, far from one another.
 
     Most of the 3 x 3 cells around a source are free, so that walls and not narrow niches make an

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.apartments.floor_plan import FloorPlan, Piece
+from avn.views import curtain_model
 from avn.views.furniture_models import FurnitureModel, assets_hash, catalogue, load_model
 from avn.views.mesh import Mesh, boxes, join
 
@@ -80,7 +81,7 @@ def choose(
     Returns
     -------
     FurnitureModel or None
-        None if no model represents this kind of piece.
+        None if no model of the catalogue represents this kind of piece; curtains are not in it.
     """
     piece = plan.furniture[index]
     fits = [model for model in catalogue() if piece.kind in model.kinds and model.pool == part]
@@ -131,12 +132,14 @@ def _placed(plan: FloorPlan, index: int, part: str, appearance_seed: int) -> Mes
     x0, y0, x1, y1 = piece.bounds
     lower = np.array([x0, y0, piece.z])
     upper = np.array([x1, y1, piece.z + piece.height])
-    model = choose(plan, index, part, appearance_seed)
-    if model is None:
+    if piece.kind == curtain_model.KIND:
+        names = (plan.name, appearance_seed, _room(plan, piece))
+        shape, count = curtain_model.curtain(piece, part, *names), 1
+    elif (model := choose(plan, index, part, appearance_seed)) is not None:
+        shape, count = load_model(model.name), copies(model, piece)
+    else:
         colour = np.array([_PLAIN.get(piece.material, _UNKNOWN)], dtype=np.float32)
         return boxes(lower[None], upper[None], colour, np.array([index], dtype=np.int32))
-    shape = load_model(model.name)
-    count = copies(model, piece)
     unit = np.concatenate([_shifted(shape.vertices, i, count) for i in range(count)])
     vertices = lower + _turned(unit, piece.heading) * (upper - lower)
     return Mesh(
