@@ -28,6 +28,7 @@ from avn.core.files import atomic_write, partial_folder
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene_file
+from avn.dataset.parts import Parts
 from avn.dataset.scene import (
     DIRECT_PATH_VERSION,
     GEOMETRY_VERSION,
@@ -119,7 +120,7 @@ def _points(centres: np.ndarray, height: float) -> np.ndarray:
     return np.column_stack([centres, np.full(len(centres), height)])
 
 
-def _render_reverberation(job: _Job) -> int:
+def _render_reverberation(job: _Job) -> Path:
     surfaces = build_surfaces(job.plan)
     source = np.array([*job.source, job.acoustics.source_height])
     receivers = _points(job.cells, job.acoustics.receiver_height)
@@ -131,7 +132,7 @@ def _render_reverberation(job: _Job) -> int:
             scale=reverberation.scale,
             cut_db=reverberation.cut_db,
         )
-    return len(job.cells)
+    return job.part
 
 
 def _render_direct_paths(job: _Job) -> DirectPaths:
@@ -145,7 +146,8 @@ def build_reverberation(
 ) -> None:
     """Render the reverberation of apartments in worker processes, one job for each source.
 
-    The results do not depend on the number of processes.
+    The file of an apartment is written as soon as its sources are done. The results do not depend
+    on the number of processes.
 
     Parameters
     ----------
@@ -158,14 +160,18 @@ def build_reverberation(
     """
     jobs = [_jobs(scene, acoustics, path) for scene, path, _ in files]
     todo = [job for scene_jobs in jobs for job in scene_jobs if not job.part.is_file()]
+    left = Parts([[job.part for job in scene_jobs] for scene_jobs in jobs])
+    for index in left.whole:
+        _assemble(files[index], acoustics, jobs[index])
     total = sum(len(job.cells) for scene_jobs in jobs for job in scene_jobs)
-    if total:
+    if todo:
         before = total - sum(len(job.cells) for job in todo)
         with progress_bar("tracing sound", total, "pairs", before) as advance:
-            for done in in_processes(_render_reverberation, todo, processes):
-                advance(done)
-    for (scene, path, fingerprint), scene_jobs in zip(files, jobs, strict=True):
-        _assemble(scene, acoustics, scene_jobs, path, fingerprint)
+            for part in in_processes(_render_reverberation, todo, processes):
+                index, is_last = left.finish(part)
+                advance(len(jobs[index][0].cells))
+                if is_last:
+                    _assemble(files[index], acoustics, jobs[index])
 
 
 def _jobs(scene: Scene, acoustics: AcousticsConfig, path: Path) -> list[_Job]:
@@ -177,8 +183,9 @@ def _jobs(scene: Scene, acoustics: AcousticsConfig, path: Path) -> list[_Job]:
 
 
 def _assemble(
-    scene: Scene, acoustics: AcousticsConfig, jobs: list[_Job], path: Path, fingerprint: str
+    to_write: tuple[Scene, Path, str], acoustics: AcousticsConfig, jobs: list[_Job]
 ) -> None:
+    scene, path, fingerprint = to_write
     pairs = (len(jobs), scene.grid.cells)
 
     def fill(file: h5py.File) -> None:

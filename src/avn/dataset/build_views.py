@@ -21,6 +21,7 @@ from avn.core.files import atomic_write, partial_folder
 from avn.core.processes import in_processes
 from avn.core.progress import progress_bar
 from avn.dataset import scene_file
+from avn.dataset.parts import Parts
 from avn.dataset.views import KIND, VERSION
 from avn.views.renderer import Prepared, Renderer, renderer_class
 from avn.views.settings import RendererConfig
@@ -81,7 +82,8 @@ class _Rendering:
 def build_views(files: Sequence[ViewsFile], cfg: RendererConfig, processes: int) -> None:
     """Render views, in worker processes of one thread each.
 
-    The results do not depend on the number of processes.
+    The file of an apartment is written as soon as its views are done. The results do not depend on
+    the number of processes.
 
     Parameters
     ----------
@@ -107,15 +109,19 @@ def build_views(files: Sequence[ViewsFile], cfg: RendererConfig, processes: int)
                 advance(done)
     chunks = [_renderings(light) for light in lightings]
     todo = [job for own in chunks for job in own if not job.file.is_file()]
+    left = Parts([[job.file for job in own] for own in chunks])
+    for index in left.whole:
+        _assemble(files[index], cfg, chunks[index])
     if todo:
         total = sum(job.last - job.first for own in chunks for job in own)
         before = total - sum(job.last - job.first for job in todo)
         with progress_bar("rendering", total, "views", before) as advance:
-            for done in in_processes(_render, todo, processes):
-                advance(done)
+            for part, count in in_processes(_render, todo, processes):
+                index, is_last = left.finish(part)
+                advance(count)
+                if is_last:
+                    _assemble(files[index], cfg, chunks[index])
         _OPENED.clear()
-    for views, own in zip(files, chunks, strict=True):
-        _assemble(views, cfg, own)
 
 
 def _renderings(lighting: _Lighting) -> list[_Rendering]:
@@ -158,12 +164,12 @@ def _renderer(job: _Lighting) -> Renderer:
     return _OPENED[job.file]
 
 
-def _render(job: _Rendering) -> int:
+def _render(job: _Rendering) -> tuple[Path, int]:
     states = np.arange(job.first, job.last)
     rgb, depth = _renderer(job.lighting).views(job.centres[states // 4], states % 4)
     with atomic_write(job.file) as part, part.open("wb") as file:
         np.savez(file, rgb=rgb, depth=depth)
-    return len(states)
+    return job.file, len(states)
 
 
 def _assemble(views: ViewsFile, cfg: RendererConfig, chunks: list[_Rendering]) -> None:
