@@ -18,10 +18,10 @@ from avn.apartments.symmetry import layout_key
 from avn.core.errors import UserError
 
 SEEDS = range(12)
-EVERYWHERE = {"front_door", "bookshelf", "plant", "chair", "desk"}
+EVERYWHERE = {"front_door", "bookshelf", "plant", "chair", "desk", "curtain"}
 BELONGS = {
     "kitchen": {"fridge", "counter", "sink", "stove", "cupboard", "dining_table"},
-    "bedroom": {"bed", "nightstand", "wardrobe", "dresser"},
+    "bedroom": {"bed", "nightstand", "wardrobe", "dresser", "armchair"},
     "living_room": {
         "sofa", "tv_stand", "television", "coffee_table", "armchair", "sideboard", "dining_table",
     },
@@ -47,6 +47,7 @@ def homes() -> list[Home]:
     frozen = load_split(SplitConfig(folder="var"))
     plans = [plan for part in frozen.values() for plan in part]
     plans += [generate(seed, f"seed_{seed}") for seed in SEEDS]
+    plans += [generate(seed, f"home_{seed}", size="homes") for seed in SEEDS]
     return [(plan, build_grid(plan)) for plan in plans]
 
 

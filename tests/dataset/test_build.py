@@ -75,6 +75,26 @@ def test_a_killed_run_goes_on_where_it_was(plan, made, tmp_path, monkeypatch):
     assert not [path for path in scene.folder.iterdir() if path.name.startswith(".")]
 
 
+def test_an_apartment_is_written_before_the_next_one_is_begun(plan, made, tmp_path, monkeypatch):
+    scenes = [opened(plan, FEW, tmp_path / name) for name in ("one", "two")]
+    files = [(scene, scene.folder / "tail.h5", "t") for scene in scenes]
+    traced, render = [], brir.render_source
+
+    def killed_in_the_second(*arguments, **named):
+        traced.append(1)
+        if len(traced) == len(plan.sources) + 2:
+            raise KeyboardInterrupt
+        return render(*arguments, **named)
+
+    monkeypatch.setattr(brir, "render_source", killed_in_the_second)
+    with pytest.raises(KeyboardInterrupt):
+        build.build_reverberation(files, FEW, processes=1)
+    assert [path.exists() for _, path, _ in files] == [True, False]
+    build.build_reverberation(files[1:], FEW, processes=1)
+    for _, path, _ in files:
+        assert path.read_bytes() == content(made[0].folder)["tail.h5"]
+
+
 def test_what_is_gathered_is_what_was_rendered(plan, made):
     scene = made[1]
     brirs, grid, config = scene.brirs, scene.grid, ROUND

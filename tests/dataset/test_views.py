@@ -75,6 +75,25 @@ def test_a_killed_run_goes_on_where_it_was(plan, made, states, tmp_path, monkeyp
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_views_are_written_before_the_next_apartment_is_begun(plan, made, tmp_path, monkeypatch):
+    files = [ViewsFile(plan, "train", 0, tmp_path / f"{n}.h5", "a fingerprint") for n in "ab"]
+    render, chunks = Raycast.views, -(-4 * build_grid(plan).cells // 40)
+    rendered = []
+
+    def killed_in_the_second(self, centres, headings):
+        rendered.append(len(centres))
+        if len(rendered) == chunks + 2:
+            raise KeyboardInterrupt
+        return render(self, centres, headings)
+
+    monkeypatch.setattr(Raycast, "views", killed_in_the_second)
+    with pytest.raises(KeyboardInterrupt):
+        build(files, CFG, 1)
+    assert [file.path.exists() for file in files] == [True, False]
+    build(files[1:], CFG, 1)
+    assert files[0].path.read_bytes() == files[1].path.read_bytes() == made.read_bytes()
+
+
 def test_another_appearance_seed_gives_other_views(plan, made, states, tmp_path):
     other = read_views(build_views(plan, tmp_path, appearance_seed=2), states)
     assert np.abs(other.rgb.astype(int) - read_views(made, states).rgb).mean() > 5

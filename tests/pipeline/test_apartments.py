@@ -10,8 +10,9 @@ from small import composed
 from avn.apartments.splits import FROZEN
 from avn.core.errors import UserError
 from avn.pipeline.apartments import TRAINING, Apartments, apartments_of_all_subsets
-from avn.pipeline.scenes import DirectSound, Geometry
-from avn.pipeline.stage import build
+from avn.pipeline.export import stages_of
+from avn.pipeline.scenes import DirectSound, Geometry, LateReverberation
+from avn.pipeline.stage import build, missing
 from avn.pipeline.views import RenderedViews
 
 FEW = ("split=mini", "acoustics.rays=300", "acoustics.seconds=0.2", "processes=1")
@@ -71,3 +72,33 @@ def test_the_two_worlds_sound_alike_or_not_as_they_are_told(outputs):
     seen = torch.from_numpy(one.in_sight).nonzero()[0]
     pair = seen[:1], 4 * seen[1:]
     assert torch.equal(one.brirs.gather(*pair), other.brirs.gather(*pair))
+
+
+def test_a_split_of_homes_is_planned_for_the_apartments_that_are_asked_for(tmp_path):
+    numbers = ("split.train=1", "split.validation=1", "split.test=1")
+    cfg = composed("split=homes", *numbers, f"outputs={tmp_path}", command="generate")
+    steps = missing(stages_of(cfg))
+    kinds = {Geometry, LateReverberation, DirectSound, RenderedViews}
+    assert {type(step) for step in steps} == kinds
+    assert len(steps) == 3 * len(kinds)
+    for step in steps:
+        assert len(step.paths) == 1
+        assert step.seconds() < 60
+    names = {path.parent.name.split("-")[0] for step in steps for path in step.paths}
+    assert names == {"train_1", "val_1", "room_1"}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_more_homes_are_added_to_those_that_are_there(tmp_path):
+    def geometry(test):
+        cfg = composed("split=homes", f"split.test={test}", f"outputs={tmp_path}")
+        return Geometry(cfg, Apartments(cfg, "test"))
+
+    build(geometry(2))
+    made = {path: path.stat().st_mtime_ns for path in geometry(2).paths}
+    assert len(made) == len(list(tmp_path.glob("generate/*/geometry-*.h5"))) == 2
+    more = geometry(3)
+    assert more.missing() == [2]
+    build(more)
+    assert {path: path.stat().st_mtime_ns for path in geometry(2).paths} == made
+    assert geometry(1).done()

@@ -16,7 +16,7 @@ from avn.apartments.floor_plan import (
     Window,
 )
 from avn.apartments.furniture import CURTAIN, CURTAIN_WIDTHS, Rect
-from avn.apartments.placement import DOOR_CLEARANCE, inside, overlap
+from avn.apartments.placement import DOOR_CLEARANCE, PANE_CLEARANCE, inside, overlap
 from avn.core.random import Rng
 
 # Share of the windows that have curtains, by kind of room.
@@ -111,7 +111,7 @@ def _strip(opening: Doorway | Window, half: float, reach: float) -> Rect:
 
 
 def _panes(plan: FloorPlan) -> list[Rect]:
-    reach = WALL_THICKNESS / 2 + CURTAIN.depth
+    reach = WALL_THICKNESS / 2 + PANE_CLEARANCE
     return [_strip(window, window.width / 2, reach) for window in plan.windows]
 
 

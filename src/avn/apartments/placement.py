@@ -17,6 +17,8 @@ from avn.core.random import Rng
 
 # Depth of the free floor on either side of a doorway, for the leaf of the door; metres.
 DOOR_CLEARANCE = 0.9
+# Depth of the floor before a window that high furniture must not stand on; metres.
+PANE_CLEARANCE = 0.35
 # Unit vectors of the headings north, east, south, west.
 FORWARD = ((0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0))
 _TOUCH = 1e-6
@@ -100,7 +102,7 @@ class Furnisher:
         """Return the floor before each window of the room, 0.35 m deep, and its sill's height."""
         panes = []
         for window in plan.windows:
-            a, b = window.width / 2, WALL_THICKNESS / 2 + 0.35
+            a, b = window.width / 2, WALL_THICKNESS / 2 + PANE_CLEARANCE
             if window.along == "y":
                 a, b = b, a
             rect = (window.x - a, window.y - b, window.x + a, window.y + b)
