@@ -1,8 +1,8 @@
 """Print the tables of `docs/acoustics.md` that are measured on the apartments of a split.
 
 The direct-to-reverberant ratio of the impulse responses by line of sight and distance, in both
-acoustic regimes, and the reverberation time T20 of each apartment. Products that are missing are
-built. Run from the repository, with settings of ``avn generate`` as arguments:
+acoustic regimes, the reverberation time T20 of each apartment, and that within its rooms. Products
+that are missing are built. Run from the repository, with settings of ``avn generate`` as arguments:
 
     python scripts/room_acoustics.py outputs=outputs
 """
@@ -10,6 +10,7 @@ built. Run from the repository, with settings of ``avn generate`` as arguments:
 from __future__ import annotations
 
 import sys
+from collections import defaultdict
 from itertools import pairwise
 
 import numpy as np
@@ -88,6 +89,32 @@ def decay_times(scene: AudibleScene, every: int = 2) -> NDArray[np.float64]:
     return np.array(times)
 
 
+def decay_times_within_rooms(scene: AudibleScene, every: int = 2) -> dict[str, list[float]]:
+    """Return the median T20 in the own room of each source, by kind of room and floor."""
+    cells = np.arange(0, scene.grid.cells, every)
+    times = decay_times(scene, every).reshape(len(scene.sources), len(cells))
+    found: dict[str, list[float]] = defaultdict(list)
+    for source, own in zip(scene.sources, times, strict=True):
+        index = scene.grid.rooms[source]
+        room = scene.plan.rooms[index]
+        within = own[scene.grid.rooms[cells] == index]
+        found[f"{room.kind}, {room.floor}"].append(float(np.nanmedian(within)))
+    return found
+
+
+def print_decay_times_within_rooms(scenes: list[AudibleScene]) -> None:
+    """Print the median and the range over sources of T20 in the room of the source."""
+    found: dict[str, list[float]] = defaultdict(list)
+    for scene in scenes:
+        for name, times in decay_times_within_rooms(scene).items():
+            found[name] += times
+    print("| room, floor | T20 within it, median | range | sources |")
+    print("| --- | --- | --- | --- |")
+    for name, times in [*sorted(found.items()), ("all", sum(found.values(), []))]:
+        ends = f"{min(times):.2f} to {max(times):.2f} s"
+        print(f"| {name} | {np.median(times):.2f} s | {ends} | {len(times)} |", flush=True)
+
+
 def print_decay_times(scenes: list[AudibleScene]) -> None:
     """Print the median and the range of T20 of each apartment."""
     print("| apartment | T20, median | 5th to 95th percentile |")
@@ -115,6 +142,8 @@ def main() -> None:
         )
     print()
     print_decay_times(every["resonance"])
+    print()
+    print_decay_times_within_rooms(every["resonance"])
 
 
 if __name__ == "__main__":
