@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections import defaultdict
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 import torch
@@ -110,7 +110,7 @@ def print_decay_times_within_rooms(scenes: list[AudibleScene]) -> None:
             found[name] += times
     print("| room, floor | T20 within it, median | range | sources |")
     print("| --- | --- | --- | --- |")
-    for name, times in [*sorted(found.items()), ("all", sum(found.values(), []))]:
+    for name, times in [*sorted(found.items()), ("all", list(chain(*found.values())))]:
         ends = f"{min(times):.2f} to {max(times):.2f} s"
         print(f"| {name} | {np.median(times):.2f} s | {ends} | {len(times)} |", flush=True)
 
