@@ -17,7 +17,9 @@ import numpy as np
 
 import avn
 
-# Each line: its name, and the settings that it adds to those of the lines above.
+# Settings that runs with odometry do not read, and that end there.
+OF_RETRIEVAL = "mapper.grows=true"
+# Each line: its name, and the setting that it adds to those of the lines above.
 LADDERS = {
     "ours_noexp": [
         ("the paper's agent", ""),
@@ -28,7 +30,7 @@ LADDERS = {
     ],
     "ours_exp": [
         ("the paper's agent", ""),
-        ("memory and graph grow", "mapper.grows=true"),
+        ("memory and graph grow", OF_RETRIEVAL),
         ("unknown squares are nodes", "planner.obstacle_threshold=0.001"),
         ("odometry", "localisation=retrieval+odometry"),
         ("a collision costs 4 moves", "planner.collision_cost=4"),
@@ -69,6 +71,8 @@ def main(arguments: Sequence[str]) -> None:
         settings: list[str] = []
         for name, setting in lines:
             settings += [setting] if setting else []
+            if setting.startswith("localisation=") and OF_RETRIEVAL in settings:
+                settings.remove(OF_RETRIEVAL)
             each = rates(agent, [*common, *settings], **options)
             spread = ""
             if len(each) > 1:
