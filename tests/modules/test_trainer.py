@@ -103,14 +103,14 @@ class _Losses(Callback):
 
 
 def test_overfitting_repeats_a_few_batches_and_learns_them_by_heart(tmp_path: Path) -> None:
-    trainer = TrainerConfig(overfit_batches=2, max_epochs=60)
+    trainer = TrainerConfig(overfit_batches=2, max_epochs=30)
     data, model = build(patience=1, flip_augmentation=False)
     seen, losses = _Targets(), _Losses()
-    assert fit(data, model, tmp_path, [seen, losses], trainer=trainer)["epochs"] == 60
+    assert fit(data, model, tmp_path, [seen, losses], trainer=trainer)["epochs"] == 30
     first, *others = [torch.cat(epoch) for epoch in seen.epochs]
     assert len(first) == 32
     assert all(torch.equal(first, other) for other in others)
-    assert losses.found[-1] < 0.1 * losses.found[0]
+    assert losses.found[-1] < 0.2 * losses.found[0]
 
 
 def test_a_trial_trains_one_batch_and_writes_nothing(tmp_path: Path) -> None:
