@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from torch import Tensor, nn
+from torch import nn
 
 from avn.core.errors import UserError
+from avn.modules.audio_cnn import AudioCnn
 
 
-class FiveLayerCnn(nn.Module):
+class FiveLayerCnn(AudioCnn):
     """CNN of 3 x 3 convolutions that each halve the resolution, followed by dense layers.
 
     Each block is convolution, ReLU, downsampling and batch normalisation. Widths 64-128-256-512-512
@@ -80,19 +81,7 @@ class FiveLayerCnn(nn.Module):
         for wide in hidden:
             layers += [nn.Dropout(dropout), nn.Linear(size, wide), nn.ReLU()]
             size = wide
-        self.hidden_size, self._answer = size, len(layers)
+        self.hidden_size, self.answer_from = size, len(layers)
         layers += [nn.Dropout(dropout), nn.Linear(size, outputs)]
         layers += [nn.Tanh()] if tanh else []
         self.layers = nn.Sequential(*layers)
-
-    def forward(self, pictures: Tensor) -> Tensor:
-        """Map inputs (N, channels, height, width) to outputs (N, outputs)."""
-        return self.layers(pictures) * self.output_scale
-
-    def hidden(self, pictures: Tensor) -> Tensor:
-        """Return the input of the output layer, (N, `hidden_size`)."""
-        return self.layers[: self._answer](pictures)
-
-    def answer(self, hidden: Tensor) -> Tensor:
-        """Apply the output layer to the result of `hidden`; gives (N, outputs) as `forward`."""
-        return self.layers[self._answer :](hidden) * self.output_scale

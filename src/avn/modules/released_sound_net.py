@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from torch import Tensor, nn
+from torch import nn
 
 from avn.core.errors import UserError
+from avn.modules.audio_cnn import AudioCnn
 
 # Batch normalisation of Keras: its epsilon, and its momentum of 0.99 as PyTorch counts it.
 EPSILON, MOMENTUM = 1e-3, 0.01
 
 
-class ReleasedSoundNet(nn.Module):
+class ReleasedSoundNet(AudioCnn):
     """CNN of 3 x 3 convolutions with max-pooling, followed by dense layers and tanh.
 
     Each block is convolution of stride 1, ReLU, max-pooling by 2 and batch normalisation. The
@@ -77,18 +78,6 @@ class ReleasedSoundNet(nn.Module):
             layers += [nn.Dropout(share), nn.Linear(size, wide), nn.ReLU()]
             layers += [nn.BatchNorm1d(wide, EPSILON, MOMENTUM)]
             size = wide
-        self.output_scale, self.hidden_size, self._answer = output_scale, size, len(layers)
+        self.output_scale, self.hidden_size, self.answer_from = output_scale, size, len(layers)
         layers += [nn.Dropout(dropout[-1]), nn.Linear(size, outputs), *([nn.Tanh()] * tanh)]
         self.layers = nn.Sequential(*layers)
-
-    def forward(self, pictures: Tensor) -> Tensor:
-        """Map inputs (N, channels, height, width) to outputs (N, outputs)."""
-        return self.layers(pictures) * self.output_scale
-
-    def hidden(self, pictures: Tensor) -> Tensor:
-        """Return the input of the output layer, (N, `hidden_size`)."""
-        return self.layers[: self._answer](pictures)
-
-    def answer(self, hidden: Tensor) -> Tensor:
-        """Apply the output layer to the result of `hidden`; gives (N, outputs) as `forward`."""
-        return self.layers[self._answer :](hidden) * self.output_scale
