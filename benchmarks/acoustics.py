@@ -129,7 +129,8 @@ def run_ours(plan: FloorPlan, every: int, rays: int, scattered: bool) -> Outcome
         own = dataclasses.replace(config, name="benchmark", direct_path=regime)
         render_direct_paths(walls(plan), source, receivers, own)
     responses = meter.read()
-    direct = band_energies(find_paths("transmission", walls(plan), source, receivers))
+    paths = find_paths("transmission", walls(plan), source, receivers)
+    direct = band_energies(paths, air=False)
     energy = histograms.sum(axis=1) + direct * seen[:, None]
     levels = 10 * np.log10(energy.mean(axis=1))
     return Outcome(energies, responses, decay_times(histograms, STEP), levels)

@@ -8,6 +8,7 @@ import soundfile
 import torch
 
 from avn.acoustics.clips import (
+    PURPOSES,
     ClipRenderer,
     DrySounds,
     brir_spectra,
@@ -126,6 +127,18 @@ def test_the_noise_floor_has_its_level_and_differs_between_ears_and_takes() -> N
     assert noise.square().mean().sqrt() == pytest.approx(0.02, rel=0.01)
     correlation = torch.corrcoef(noise) - torch.eye(len(noise))
     assert correlation.abs().max() < 0.05
+
+
+def test_the_noise_of_training_and_of_evaluation_is_independent() -> None:
+    sounds = DrySounds({"tone": looped_tone(440.0, RATE)})
+    seed = 0  # of training and of evaluation alike
+    banks = [ClipRenderer(sounds, Microphone(), seed, purpose)._noise for purpose in PURPOSES]
+    spectra = [torch.fft.rfft(bank, n=2 * bank.shape[1]) for bank in banks]
+    train, evaluation = (each / each.abs().square().mean().sqrt() for each in spectra)
+    for ears in (train * evaluation.conj(), train * evaluation.flip(0).conj()):
+        correlation = torch.fft.irfft(ears).abs().max()  # at every shift
+        assert correlation < 0.02
+    assert torch.fft.irfft(train * train.conj()).abs().max() > 0.9
 
 
 def test_gain_scales_the_sound_and_leaves_the_noise(bank: DrySounds) -> None:

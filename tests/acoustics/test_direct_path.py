@@ -18,6 +18,7 @@ from avn.core.errors import UserError
 
 RESONANCE = AcousticsConfig()
 DIFFRACTION = AcousticsConfig(name="diffraction", direct_path="diffraction")
+NO_AIR = AcousticsConfig(air=False)
 NO_WALLS = np.zeros((0, 4))
 EAR = np.array([[0.0, 0.0, 1.5]])
 FINE = 1_536_000  # Hz: cross-correlations are interpolated to this
@@ -77,16 +78,16 @@ def test_time_and_level_differences_are_those_of_the_hrirs(
 
 def test_the_level_falls_as_one_over_distance() -> None:
     for distance in (0.5, 2.0, 7.0):
-        first = render_direct_paths(NO_WALLS, around(0, distance), EAR, RESONANCE)
+        first = render_direct_paths(NO_WALLS, around(0, distance), EAR, NO_AIR)
         energy = (responses(first)[0, 0] ** 2).sum(axis=-1).mean()
         assert energy == pytest.approx(1 / (4 * np.pi * distance**2), rel=1e-3)
         assert first.onset[0] == round(distance / SPEED_OF_SOUND * 16000)
 
 
 def test_the_spectrum_does_not_betray_the_time_of_flight() -> None:
-    """Arrivals start on whole samples: but for its level, the taps are the same at any distance."""
+    """Arrivals start on whole samples: but for level and air, the taps do not depend on it."""
     near, far = (
-        render_direct_paths(NO_WALLS, around(40, distance), EAR, RESONANCE)
+        render_direct_paths(NO_WALLS, around(40, distance), EAR, NO_AIR)
         for distance in (1.0, 6.1234)
     )
     assert near.onset[0] != far.onset[0]
@@ -160,7 +161,7 @@ def test_rendered_bands_have_the_energy_of_the_formula() -> None:
     first = render_direct_paths(plan_walls, source, receiver, DIFFRACTION)
     paths = find_paths("diffraction", plan_walls, source, receiver)
     wanted = band_energies(paths)[0]
-    free = render_direct_paths(NO_WALLS, receiver[0] + 2 * paths.arrival[0], receiver, RESONANCE)
+    free = render_direct_paths(NO_WALLS, receiver[0] + 2 * paths.arrival[0], receiver, NO_AIR)
     # Against the same direction in the open only the loss is left.
     spectra = [np.abs(np.fft.rfft(responses(f)[0, 3, 0], 16000)) for f in (first, free)]
     loss = (spectra[0] / spectra[1])[[250, 500, 1000, 2000, 4000]] ** 2 / (4 * np.pi * 4)

@@ -117,5 +117,6 @@ def test_reverberation_has_the_energy_of_the_room_constant(absorbed: float, air:
     assert (np.abs(level - wanted) < 4 * error + 0.01 * wanted).all()
     # at the critical distance, sqrt(R / 16 pi), the direct sound has the same energy
     critical = np.sqrt(4 / wanted[0] / (16 * np.pi))
-    direct = band_energies(straight_paths(np.zeros(3), np.array([[critical, 0.0, 0.0]])))[0, 0]
+    path = straight_paths(np.zeros(3), np.array([[critical, 0.0, 0.0]]))
+    direct = band_energies(path, air=air)[0, 0]
     assert 10 * np.log10(direct / level[0]) == pytest.approx(0, abs=0.2)

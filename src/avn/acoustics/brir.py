@@ -179,8 +179,9 @@ def render_direct_paths(
     """
     paths = find_paths(config.direct_path, walls, source, receivers)
     # One length for all sources of a regime, with or without diffracted paths.
-    loss_taps = round(LOSS_SECONDS * config.rate) if config.direct_path == "diffraction" else 1
-    return render_paths(paths, head_filters(config.rate), config.rate, loss_taps)
+    attenuated = config.air or config.direct_path == "diffraction"
+    loss_taps = round(LOSS_SECONDS * config.rate) if attenuated else 1
+    return render_paths(paths, head_filters(config.rate), config.rate, loss_taps, config.air)
 
 
 def combine(reverberation: Reverberation, direct_path: DirectPaths) -> NDArray[np.float32]:

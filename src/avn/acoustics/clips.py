@@ -138,7 +138,8 @@ class ClipRenderer:
         words = torch.tensor([int(seed), PURPOSES.index(purpose)], device=device)
         self._key = absorb(torch.zeros((), dtype=torch.int64, device=device), words)
         # One half of the noise for each ear, so that the two are independent.
-        noise = np.random.default_rng(int(seed) % 2**64).standard_normal((2, NOISE_SAMPLES))
+        random = np.random.default_rng([int(seed) % 2**64, PURPOSES.index(purpose)])
+        noise = random.standard_normal((2, NOISE_SAMPLES))
         self._noise = torch.from_numpy(noise.astype(np.float32)).to(device)
 
     def render(

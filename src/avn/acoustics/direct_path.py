@@ -9,8 +9,9 @@ Two regimes set the effect of walls:
   N = 2 x detour / wavelength, with the detour of the whole path.
 
 Furniture is transparent in both regimes. The amplitude without attenuation is 1 / (sqrt(4 pi) D).
-The onset is rounded to a whole sample, so that no fractional delay colours the spectrum and its
-magnitude does not depend on the time of flight.
+Air takes the same part of the energy in each band as of a reflection, exp(-m D) over the length D
+of the path. The onset is rounded to a whole sample, so that no fractional delay colours the
+spectrum.
 """
 
 from dataclasses import dataclass
@@ -22,11 +23,11 @@ from scipy import fft
 from avn.acoustics.ambisonics import sh
 from avn.acoustics.band_filters import minimum_phase
 from avn.acoustics.corners import Paths, diffracted_paths, straight_paths
-from avn.acoustics.materials import BANDS, SPEED_OF_SOUND
+from avn.acoustics.materials import BANDS, SPEED_OF_SOUND, air_attenuation
 from avn.acoustics.rendering import to_int16
 from avn.core.errors import UserError
 
-LOSS_SECONDS = 0.008
+LOSS_SECONDS = 0.008  # length of the filters that attenuate the bands
 REGIMES = ("transmission", "diffraction")
 
 
@@ -87,16 +88,22 @@ def screen_loss(detour: NDArray[np.float64]) -> NDArray[np.float64]:
     return loss
 
 
-def band_energies(paths: Paths) -> NDArray[np.float64]:
-    """Compute the energy per square metre of the direct paths in each band, shape (L, 6)."""
-    loss = np.where(paths.bent[:, None], screen_loss(paths.detour), 0.0)
-    spread = 4 * np.pi * paths.length[:, None] ** 2
+def band_energies(paths: Paths, air: bool = True) -> NDArray[np.float64]:
+    """Compute the energy per square metre of the direct paths in each band, shape (L, 6).
+
+    With `air`, air absorbs energy over the length of the paths.
+    """
     reached = np.isfinite(paths.length)[:, None]
-    return np.where(reached, 10 ** (-np.where(reached, loss, 0.0) / 10) / spread, 0.0)
+    length = np.where(reached, paths.length[:, None], 1.0)
+    screened = np.where(reached & paths.bent[:, None], screen_loss(paths.detour), 0.0)
+    energy = 10 ** (-screened / 10) / (4 * np.pi * length**2)
+    if air:
+        energy *= np.exp(-air_attenuation() * length)
+    return np.where(reached, energy, 0.0)
 
 
 def render_paths(
-    paths: Paths, filters: NDArray[np.float32], rate: int, loss_taps: int
+    paths: Paths, filters: NDArray[np.float32], rate: int, loss_taps: int, air: bool = True
 ) -> DirectPaths:
     """Render direct paths to binaural responses.
 
@@ -109,18 +116,21 @@ def render_paths(
     rate : int
         Sampling rate in Hz.
     loss_taps : int
-        Length of the filters of diffracted paths; 1 where all paths are straight.
+        Length of the filters that attenuate the bands; 1 where nothing does so, that is where all
+        paths are straight and there is no absorption by air.
+    air : bool
+        True for absorption by air.
     """
     receiver_count = len(paths.length)
     reached = np.isfinite(paths.length)
     arrival = np.where(reached[:, None], paths.arrival, [0.0, 1.0, 0.0])
     ears = np.einsum("hect,lc->lhet", filters.astype(np.float64), sh(arrival))
-    energies = band_energies(paths)
+    energies = band_energies(paths, air)
     loss = np.zeros((receiver_count, loss_taps))
     loss[:, 0] = np.sqrt(energies[:, -1])  # a path without attenuation has a single tap
-    diffracted = paths.bent & reached
-    if diffracted.any():
-        loss[diffracted] = minimum_phase(np.sqrt(energies[diffracted]), rate, loss_taps)
+    attenuated = (paths.bent | air) & reached
+    if attenuated.any():
+        loss[attenuated] = minimum_phase(np.sqrt(energies[attenuated]), rate, loss_taps)
     taps = ears.shape[-1] + loss_taps - 1
     if loss_taps == 1:
         ears *= loss[:, None, None]

@@ -28,7 +28,7 @@ class AcousticsConfig:
     receiver_height, source_height : float
         Metres above the floor.
     air : bool
-        True for absorption by air.
+        True for absorption by air, of reflections and of the direct sound.
     seed : int
         Seed of the ray tracing.
     """

@@ -133,6 +133,7 @@ class DirectSound(_Acoustic):
     """Stage of direct sound in an acoustic regime, the early part of the impulse responses."""
 
     kind = "generate/direct_sound"
+    version = 2  # air absorbs the direct sound
 
     def needs(self) -> Sequence[Any]:
         """Return the stages of geometry and late reverberation."""
@@ -140,8 +141,8 @@ class DirectSound(_Acoustic):
         return (Geometry(*arguments), LateReverberation(*arguments))
 
     def settings(self) -> Sequence[str]:
-        """Return the keys of the acoustic regime."""
-        return _keys(self.apartments, _REGIME)
+        """Return the keys of the acoustic regime, and of absorption by air."""
+        return _keys(self.apartments, (*_REGIME, "air"))
 
     @property
     def title(self) -> str:
