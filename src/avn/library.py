@@ -29,7 +29,6 @@ from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.pipeline.apartments import Apartments, PerApartment
-from avn.pipeline.audio_inference import HEARING_SEED
 from avn.pipeline.export import settings_of
 from avn.pipeline.models import model_of, train_model
 from avn.pipeline.observations import Observed
@@ -99,6 +98,7 @@ def render_clip(
     state: int,
     sound: str | None = None,
     realisation: int = 0,
+    seed: int = 0,
     overrides: Overrides = (),
 ) -> NDArray[np.float32]:
     """Render one second of sound at the two ears of an agent.
@@ -117,6 +117,8 @@ def render_clip(
         Name of a sound of the config; the first one by default.
     realisation : int
         Number of the random draw.
+    seed : int
+        Seed of the evaluation.
     overrides : sequence of str
         Settings of sound and microphone, such as `sound=path/to/file.wav`, and those of the scene.
 
@@ -143,7 +145,7 @@ def render_clip(
         if not 0 <= value < count:
             raise UserError(f"{key}: {value} is none of 0 to {count - 1} of {scene.name}")
     microphone = build_object("microphone", cfg.microphone)
-    renderer = ClipRenderer(sounds, microphone, HEARING_SEED, "eval")
+    renderer = ClipRenderer(sounds, microphone, seed, "eval")
     index = [source, state, names.index(sound) if sound else 0, realisation]
     clip = ClipId(*(torch.tensor([value]) for value in index))
     spectra = brir_spectra(scene.brirs.gather(clip.source, clip.state), sounds.rate)

@@ -27,7 +27,7 @@ from avn.navigation.scene_batch import SceneBatch, build_scene_batch
 from avn.navigation.start_sampler import build_start_sampler
 from avn.pipeline.agent import build_agent
 from avn.pipeline.apartments import TEST, TRAINING, Apartments
-from avn.pipeline.audio_inference import Clips
+from avn.pipeline.audio_inference import SELECTION_CLIPS, TRAINING_CLIPS, Clips
 from avn.pipeline.observations import OBSERVATIONS, OWN, Observed
 from avn.pipeline.policy import learns
 from avn.pipeline.policy_data import build_algorithm
@@ -207,7 +207,7 @@ def _observed(cfg: DictConfig, part: str, names: Sequence[str]) -> Observed:
             raise UserError(f"observations: '{name}' is none of {', '.join(NAMES)}")
     needed = [name for name in names if name != "map"]
     needed += ["local_patch"] if "map" in names else []
-    clips = Clips("algorithm.realisations", "train") if part == "train" else Clips()
+    clips = {"train": TRAINING_CLIPS, "validation": SELECTION_CLIPS}.get(part, Clips())
     apartments = Apartments(cfg, part, TEST if part == "test" else TRAINING)
     observed = Observed(apartments, needed, clips)
     observed.check(str(cfg.agent.name), needed)

@@ -40,7 +40,7 @@ class PlainWindowNet(nn.Module):
         self,
         camera: CameraConfig,
         widths: Sequence[int] = (16, 32, 64, 64),
-        hidden: Sequence[int] = (256,),
+        hidden: Sequence[int] = (64,),
         dropout: float = 0.25,
     ) -> None:
         super().__init__()

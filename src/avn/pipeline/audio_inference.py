@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 # Clips rendered at once; more would leave the caches of a CPU.
 BATCH = 96
-# Seed of the realisations of clips; an episode samples among them with its own seed.
-HEARING_SEED = 0
 MOST_REALISATIONS = 1000
 # Rough speed of inference on two cores, for estimates of durations.
 CLIPS_PER_SECOND = 1500
@@ -51,10 +49,28 @@ class Clips:
         Config key of the number of realisations of each clip.
     purpose : {"eval", "train"}
         Use of the clips; realisations of the two are disjoint.
+    seed : str, optional
+        Config key of the seed of the realisations, that of the episodes by default. None is a
+        seed of 0, for clips on which networks are trained or selected.
     """
 
     realisations: str = "realisations"
     purpose: str = "eval"
+    seed: str | None = "seed"
+
+    def settings(self) -> tuple[str, ...]:
+        """Return the keys of the config that change the realisations."""
+        return (self.realisations, *(() if self.seed is None else (self.seed,)))
+
+    def seed_of(self, cfg: DictConfig) -> int:
+        """Return the seed of the realisations."""
+        return 0 if self.seed is None else int(OmegaConf.select(cfg, self.seed))
+
+
+# Clips of the apartments in which an actor-critic is selected.
+SELECTION_CLIPS = Clips(seed=None)
+# Clips of the apartments in which an actor-critic is trained.
+TRAINING_CLIPS = Clips("algorithm.realisations", "train", None)
 
 
 def check_realisations(cfg: DictConfig, clips: Clips) -> None:
@@ -103,20 +119,16 @@ class AudioInference(ApartmentTensors):
         return (self.network, DirectSound(self.cfg, self.apartments))
 
     def settings(self) -> Sequence[str]:
-        """Return the keys of the microphone and of the number of realisations."""
-        return (self.apartments.world.microphone, self.clips.realisations)
+        """Return the keys of the microphone and of the realisations."""
+        return (self.apartments.world.microphone, *self.clips.settings())
 
     def consulted(self) -> Sequence[str]:
         """Return the keys of split and sounds; the fingerprint holds their content instead."""
         return (*super().consulted(), self.apartments.world.sounds)
 
     def content(self) -> Any:
-        """Return the hashes of the recordings, and the seeds of the realisations."""
-        return (
-            sounds_content(self.cfg, self.apartments.world),
-            self.clips.purpose,
-            HEARING_SEED,
-        )
+        """Return the hashes of the recordings, and the use of the clips."""
+        return (sounds_content(self.cfg, self.apartments.world), self.clips.purpose)
 
     def seconds(self) -> float:
         """Estimate the duration from the number of clips."""
@@ -148,7 +160,7 @@ class AudioInference(ApartmentTensors):
                 model,
                 self.realisations,
                 microphone,
-                seed=HEARING_SEED,
+                seed=self.clips.seed_of(self.cfg),
                 purpose=self.clips.purpose,
                 output=self.output_of(model),
             )

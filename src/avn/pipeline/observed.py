@@ -15,7 +15,7 @@ from avn.core.classes import build_object
 from avn.core.clip_id import ClipId
 from avn.navigation.trace import Trace
 from avn.pipeline.apartments import Apartments
-from avn.pipeline.audio_inference import HEARING_SEED
+from avn.pipeline.audio_inference import Clips
 from avn.pipeline.replay import Run
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds
@@ -51,8 +51,9 @@ class RunObservations:
         self._scenes = {scene.name: scene for scene in sound.load()}
         self._views = dict(zip(self._scenes, (views.rgb for views in rendered.load()), strict=True))
         # the clips of `SourceEstimates`: same microphone, seed and purpose
+        clips, microphone = Clips(), build_object("microphone", cfg.microphone)
         self._renderer = ClipRenderer(
-            dry_sounds(cfg), build_object("microphone", cfg.microphone), HEARING_SEED, "eval"
+            dry_sounds(cfg), microphone, clips.seed_of(cfg), clips.purpose
         )
 
     def views(self, scene: str, states: Sequence[int] | NDArray[np.int64]) -> NDArray[np.uint8]:

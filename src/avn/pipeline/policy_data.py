@@ -14,7 +14,7 @@ from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import SceneBatch, build_scene_batch
 from avn.pipeline.apartments import TRAINING, Apartments
-from avn.pipeline.audio_inference import Clips
+from avn.pipeline.audio_inference import SELECTION_CLIPS, TRAINING_CLIPS
 from avn.pipeline.observations import OBSERVATIONS, Observed
 from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.scenes import Geometry
@@ -64,7 +64,7 @@ def feature_sizes(cfg: DictConfig, tables: SceneBatch) -> dict[str, int]:
 def observed(cfg: DictConfig, subset: str) -> Observed:
     """Return the observations of an actor-critic in a subset of the training world."""
     names = observation_names(cfg)
-    clips = Clips("algorithm.realisations", "train") if subset == "train" else Clips()
+    clips = TRAINING_CLIPS if subset == "train" else SELECTION_CLIPS
     return Observed(Apartments(cfg, subset, TRAINING), names, clips)
 
 

@@ -21,7 +21,7 @@ from avn.core.settings import plain
 from avn.dataset.scene import AudibleScene
 from avn.modules.spectrogram import Spectrogram
 from avn.pipeline.apartments import Apartments
-from avn.pipeline.audio_inference import HEARING_SEED, Clips, check_realisations
+from avn.pipeline.audio_inference import Clips, check_realisations
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds, sounds_content
 from avn.pipeline.stage import Stage
@@ -54,16 +54,16 @@ class Waveforms(Stage):
         return (DirectSound(self.cfg, self.apartments),)
 
     def settings(self) -> Sequence[str]:
-        """Return the keys of the microphone and of the number of realisations."""
-        return (self.apartments.world.microphone, self.clips.realisations)
+        """Return the keys of the microphone and of the realisations."""
+        return (self.apartments.world.microphone, *self.clips.settings())
 
     def consulted(self) -> Sequence[str]:
         """Return the key of the sounds; the fingerprint holds their content instead."""
         return (self.apartments.world.sounds,)
 
     def content(self) -> Any:
-        """Return the hashes of the recordings, and the seeds of the realisations."""
-        return (sounds_content(self.cfg, self.apartments.world), self.clips.purpose, HEARING_SEED)
+        """Return the hashes of the recordings, and the use of the clips."""
+        return (sounds_content(self.cfg, self.apartments.world), self.clips.purpose)
 
     @property
     def title(self) -> str:
@@ -99,7 +99,8 @@ class Waveforms(Stage):
         world = self.apartments.world
         microphone = build_object(world.microphone, OmegaConf.select(self.cfg, world.microphone))
         sounds = dry_sounds(self.cfg, world)
-        renderer = ClipRenderer(sounds, microphone, HEARING_SEED, self.clips.purpose)
+        seed = self.clips.seed_of(self.cfg)
+        renderer = ClipRenderer(sounds, microphone, seed, self.clips.purpose)
         realisations = int(OmegaConf.select(self.cfg, self.clips.realisations))
         output, shape = self.output()
         return [
