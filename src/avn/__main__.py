@@ -6,6 +6,7 @@ import importlib
 import sys
 
 COMMANDS = {
+    "demo": "a first try: one home, the networks of the package, a film of an episode",
     "generate": "build the apartments of a split, their sound and their views",
     "train": "train a network or an actor-critic agent",
     "eval": "evaluate an agent, and print its row of the table",

@@ -102,7 +102,7 @@ def test_how_an_agent_acts_is_no_part_of_what_it_learnt(override, wanted):
 @pytest.mark.parametrize(
     ("override", "wanted"),
     [
-        ("seed=5", RUN | {"run_windows"}),
+        ("seed=5", RUN | {"run_windows", "estimates", "stops"}),
         ("episodes=exhaustive", RUN | {"run_windows"}),
         ("sound=alarm", HEARD | {"run_windows"}),
         ("realisations=2", HEARD | {"run_windows", "policy", "policy_map"}),

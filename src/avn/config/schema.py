@@ -217,6 +217,7 @@ class EvalConfig(CoreConfig):
     seed: int = MISSING
     episodes: str = MISSING
     subset: str = MISSING
+    networks: str = MISSING
     film: int = MISSING
     film_show: str = MISSING
     film_speed: float = MISSING
@@ -230,6 +231,7 @@ class ReproduceConfig(CoreConfig):
     sounds: list[str] = MISSING
     seeds: list[int] = MISSING
     train_seeds: list[int] = MISSING
+    paired: bool = MISSING
 
 
 # Schema that all options of a group share.

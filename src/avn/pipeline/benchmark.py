@@ -10,9 +10,11 @@ from omegaconf import DictConfig, OmegaConf
 from avn.core.settings import plain
 from avn.modules.settings import SAME_WEIGHTS
 from avn.pipeline.apartments import TEST, TRAINING
+from avn.pipeline.published_networks import PUBLISHED
 from avn.pipeline.run import Evaluation, agent_label
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stage import MACHINE
+from avn.pipeline.trained import NETWORKS
 from avn.reporting.paper import PAPER_SOUNDS
 from avn.reporting.results import ALL_SOUNDS
 from avn.reporting.world import sounds_text, trial_note
@@ -52,6 +54,7 @@ def changed_settings(cfg: DictConfig, default: DictConfig) -> dict[str, str]:
         for key in Evaluation(cfg).read()
         if not key.startswith(f"{TEST.sounds}.")
         and compared(key)
+        and key != NETWORKS
         and not key.endswith(".train_seed")
     }
     keys -= {key for key in keys if _follows(cfg, key, keys)}
@@ -125,7 +128,10 @@ def describe_world(cfg: DictConfig, default: DictConfig) -> str:
     scenes = OmegaConf.select(cfg, f"{TRAINING.split}.name")
     if reads_training and scenes != cfg.split.name:
         split += f" (networks trained in {scenes})"
-    return "; ".join((*parts, f"{cfg.subset} apartments of {split}"))
+    parts.append(f"{cfg.subset} apartments of {split}")
+    if cfg.get(NETWORKS) == PUBLISHED and NETWORKS in Evaluation(cfg).read():
+        parts.append("networks published with the package")
+    return "; ".join(parts)
 
 
 def note_of(cfg: DictConfig) -> str:

@@ -21,8 +21,8 @@ from avn.core.progress import progress_bar
 from avn.core.settings import plain, typed
 from avn.dataset.scene import Scene
 from avn.dataset.views import Views
+from avn.pipeline.fitted import Fitted
 from avn.pipeline.per_scene import ApartmentTensors
-from avn.pipeline.trained import Fitted
 from avn.pipeline.views import RenderedViews
 from avn.views.local_patch_visibility import visible_cells
 from avn.views.settings import CameraConfig

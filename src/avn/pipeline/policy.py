@@ -203,6 +203,9 @@ class Policy(Trained):
         from avn.rl.networks import ActorCritic
 
         network = ActorCritic(network_spec(self.cfg, self._feature_sizes()))
+        if self.published:
+            network.load_state_dict(self.published.weights())
+            return network.eval()
         load_network(network, self.folder / BEST, self.fingerprint)
         self.check_weights()
         return network.eval()

@@ -2,36 +2,44 @@
 
 from __future__ import annotations
 
-import dataclasses
+import copy
 import json
 from abc import abstractmethod
-from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from avn.core.errors import UserError
 from avn.core.files import atomic_write, stage_folder
-from avn.core.hashing import file_hash
-from avn.core.settings import leaves, plain, typed, values
-from avn.modules.settings import BEST, LAST, OF_ONE, SAME_WEIGHTS, TrainerConfig
+from avn.core.hashing import digest, file_hash
+from avn.core.settings import leaves, plain, values
+from avn.modules.settings import BEST, LAST
 from avn.pipeline.apartments import TRAINING, Apartments
+from avn.pipeline.published_networks import (
+    PUBLISHED,
+    TRAINED,
+    PublishedNetwork,
+    check_networks,
+    published_network,
+)
 from avn.pipeline.stage import Stage, with_sources
 from avn.reporting.events import write_summary
 from avn.reporting.model_card import write_card
 
 if TYPE_CHECKING:
-    import lightning as L
-    from lightning.pytorch.callbacks import Callback
     from lightning.pytorch.loggers import Logger
 
-    from avn.modules.network import Network
 
 METRICS, CHECKSUM = "metrics.json", "best.ckpt sha256"
+# Key of the config that says whether networks are trained or published.
+NETWORKS = "networks"
 
 
 class Trained(Stage):
     """Stage of a network that is trained in the training world.
+
+    With `networks=published` it is the network of the package that the training would make: it has
+    no needs and reads the same settings.
 
     Attributes
     ----------
@@ -58,14 +66,50 @@ class Trained(Stage):
         """Name of the folder, without the hash."""
         return self.kind.split("/")[1]
 
+    @cached_property
+    def published(self) -> PublishedNetwork | None:
+        """Network of the package in place of the training, with `networks=published`.
+
+        Raises
+        ------
+        UserError
+            Where the package has no network of these settings.
+        """
+        networks = self.cfg.get(NETWORKS, TRAINED)
+        check_networks(networks)
+        if networks != PUBLISHED:
+            return None
+        return published_network(self._training.fingerprint, self.title)
+
+    @cached_property
+    def _training(self) -> Trained:
+        """Stage of the training, where the network is published."""
+        cfg = copy.deepcopy(self.cfg)
+        cfg[NETWORKS] = TRAINED
+        return type(self)(cfg)
+
+    @cached_property
+    def needed(self) -> tuple[Stage, ...]:
+        """Result of `needs`, cached; nothing for a published network."""
+        return () if self.published else tuple(self.needs())
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of all that the network depends on; of a published one, of its weights."""
+        if self.published:
+            return digest(self.kind, PUBLISHED, self.published.sha256)
+        return super().fingerprint
+
     @property
     def folder(self) -> Path:
-        """`outputs/train/<name>-<hash8>`."""
+        """`outputs/train/<name>-<hash8>`, or the folder of published networks."""
+        if self.published:
+            return self.published.path.parent
         return stage_folder(self.cfg.outputs, "train", self.name, self.fingerprint)
 
     def done(self) -> bool:
-        """Return whether the training is finished."""
-        return (self.folder / METRICS).is_file()
+        """Return whether the training is finished; a published network is."""
+        return self.published is not None or (self.folder / METRICS).is_file()
 
     def begun(self) -> bool:
         """Return whether an interrupted training has left a checkpoint."""
@@ -93,7 +137,10 @@ class Trained(Stage):
 
     def read_here(self) -> set[str]:
         """Return the keys that it reads, among them those of the loggers."""
-        return super().read_here() | leaves(self.cfg, ("logger",))
+        if self.published:
+            return self._training.read() | {NETWORKS}
+        own = {NETWORKS} & set(self.cfg)
+        return super().read_here() | leaves(self.cfg, ("logger",)) | own
 
     def loggers(self, step: int = 0) -> list[Logger]:
         """Return the loggers of the training; `step` is the first of a resumed one."""
@@ -117,6 +164,8 @@ class Trained(Stage):
 
     def metrics(self) -> dict[str, Any]:
         """Read the metrics of the training; raise `UserError` where the file is damaged."""
+        if self.published:
+            return self.published.metrics
         path = self.folder / METRICS
         try:
             return dict(json.loads(path.read_text()))
@@ -185,123 +234,3 @@ class Trained(Stage):
             "training apartments": ", ".join(plan.name for plan in self.train.plans),
             "validation apartments": ", ".join(plan.name for plan in self.validation.plans),
         }
-
-
-class Fitted(Trained):
-    """Stage of a network that Lightning fits to a data module."""
-
-    @abstractmethod
-    def untrained(self) -> Network:
-        """Return the network with its initial weights."""
-
-    @abstractmethod
-    def data(self) -> L.LightningDataModule:
-        """Return the data module."""
-
-    @property
-    def monitor(self) -> str:
-        """Metric by which the best epoch is chosen."""
-        return str(self.untrained().monitor)
-
-    def read_alone(self) -> set[str]:
-        """Return the keys that it reads as the network that `avn.train` names."""
-        return super().read_alone() | {"trainer.overfit_batches"}
-
-    def check(self) -> None:
-        """Refuse an invalid recipe, and settings of the trainer that cannot work."""
-        from avn.modules.attachments import check_attachments
-        from avn.modules.checkpoints import check_start
-        from avn.modules.trainer import check_trainer
-
-        super().check()
-        model = self.untrained()
-        check_trainer(self.trainer)
-        if self.start is not None and not self.begun():
-            check_start(self.start, model, self.epochs)
-        check_attachments({}, plain(self.cfg, "callbacks"))
-
-    @property
-    def trainer(self) -> TrainerConfig:
-        """Settings of the trainer."""
-        settings: TrainerConfig = typed(self.cfg.trainer)
-        return settings
-
-    @property
-    def epochs(self) -> int:
-        """Maximum number of epochs."""
-        return int(self.cfg.trainer.max_epochs or self.cfg[self.node].epochs)
-
-    def in_epoch(self, inputs: int) -> int:
-        """Return how many of a number of inputs an epoch of this training has."""
-        few = self.cfg.trainer.overfit_batches * self.cfg[self.node].batch
-        return min(inputs, few) if few else inputs
-
-    def trainer_inputs(self) -> list[Any]:
-        """Return the settings of trainer and callbacks that change the product."""
-        usual, callbacks = TrainerConfig(), plain(self.cfg, "callbacks")
-        changed = {
-            key: value
-            for key, value in plain(self.cfg, "trainer").items()
-            if key not in SAME_WEIGHTS and value != getattr(usual, key)
-        }
-        return [given for given in (changed, callbacks) if given]
-
-    def read_here(self) -> set[str]:
-        """Return the keys that it reads, among them those of the trainer."""
-        of_one = [f"trainer.{key}" for key in OF_ONE]
-        return super().read_here() | leaves(self.cfg, ("trainer", "callbacks"), of_one)
-
-    def measure(self, model: Any, data: Any) -> dict[str, Any]:
-        """Compute metrics of the trained network in addition to those of the training."""
-        return {}
-
-    def callbacks(self) -> Sequence[Callback]:
-        """Return callbacks of the training, such as those that log figures to TensorBoard."""
-        return ()
-
-    def make(self) -> None:
-        """Train the network, or resume an interrupted training."""
-        from avn.modules import training
-
-        model = self.untrained()
-        data = self.data()
-        metrics = training.fit(
-            data,
-            model,
-            self.folder,
-            [*self.callbacks(), *self._added(self.folder)],
-            self.loggers(),
-            dataclasses.replace(self.trainer, fast_dev_run=0),
-            self.start,
-        )
-        self.finish(metrics | self.measure(model, data), dict(model.hparams))
-
-    def trial(self, batches: int) -> None:
-        """Train a few batches and measure once, in a folder that is deleted afterwards."""
-        from avn.modules import training
-
-        trainer = dataclasses.replace(self.trainer, fast_dev_run=batches)
-        with TemporaryDirectory() as parent:
-            folder = Path(parent) / self.folder.name
-            callbacks = [*self.callbacks(), *self._added(folder)]
-            training.fit(self.data(), self.untrained(), folder, callbacks, (), trainer, self.start)
-
-    def _added(self, folder: Path) -> Sequence[Callback]:
-        from avn.modules.attachments import build_callbacks
-
-        return build_callbacks(plain(self.cfg, "callbacks"), folder)
-
-    def load(self) -> Any:
-        """Return the trained network.
-
-        Raises
-        ------
-        UserError
-            Where a checkpoint belongs to another config, or has changed since it was trained.
-        """
-        from avn.modules import training
-
-        model = self.untrained()
-        training.load_weights(model, self.folder / BEST)
-        self.check_weights()
-        return model

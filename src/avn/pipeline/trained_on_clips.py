@@ -9,9 +9,9 @@ from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.pipeline.apartments import TRAINING
+from avn.pipeline.fitted import Fitted
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
-from avn.pipeline.trained import Fitted
 
 # Clips that two cores train on in a second.
 CLIPS_PER_SECOND = 1000

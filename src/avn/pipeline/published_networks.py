@@ -1,0 +1,121 @@
+"""Trained networks that come with the package, each found by the fingerprint of its training.
+
+`assets/networks` has a file of weights and a model card for each network, and `index.json` with
+its fingerprint, metrics and hash. Weights with two or more dimensions are stored in 16 bits; the
+figures of a published network are measured with these.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from avn.core.errors import UserError
+from avn.core.hashing import file_hash
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+FOLDER = Path(__file__).parents[1] / "assets" / "networks"
+INDEX = "index.json"
+# Values of `networks`.
+TRAINED, PUBLISHED = "trained", "published"
+
+
+@dataclass(frozen=True)
+class PublishedNetwork:
+    """Network of the package.
+
+    Attributes
+    ----------
+    name : str
+        Name of its files, without suffix.
+    title : str
+        Description of the network.
+    sha256 : str
+        Hash of the file of weights.
+    metrics : dict
+        Metrics of the training by name.
+    """
+
+    name: str
+    title: str
+    sha256: str
+    metrics: dict[str, Any]
+
+    @property
+    def path(self) -> Path:
+        """File of weights."""
+        return FOLDER / f"{self.name}.safetensors"
+
+    def weights(self) -> dict[str, Tensor]:
+        """Read the weights by name, as float32.
+
+        Raises
+        ------
+        UserError
+            If the file is missing or damaged.
+        """
+        from safetensors.torch import load
+
+        try:
+            content = self.path.read_bytes()
+        except OSError:
+            raise _damaged(self.path) from None
+        if file_hash(self.path) != self.sha256:
+            raise _damaged(self.path)
+        return {
+            name: own.float() if own.is_floating_point() else own
+            for name, own in load(content).items()
+        }
+
+
+def published_networks() -> dict[str, PublishedNetwork]:
+    """Return the networks of the package by the fingerprint of their training."""
+    return _read(FOLDER / INDEX)
+
+
+def published_network(fingerprint: str, title: str) -> PublishedNetwork:
+    """Return the network of the package that a training would make.
+
+    Parameters
+    ----------
+    fingerprint : str
+        Fingerprint of the training.
+    title : str
+        Title of the training, for messages.
+
+    Raises
+    ------
+    UserError
+        If the package has no such network.
+    """
+    known = published_networks()
+    if fingerprint not in known:
+        raise UserError(
+            f"networks=published: the package has no {title} of these settings; give "
+            f"networks=trained, or the settings of a network of {FOLDER}"
+        )
+    return known[fingerprint]
+
+
+def check_networks(value: str) -> None:
+    """Raise `UserError` where a value of `networks` is unknown."""
+    if value not in (TRAINED, PUBLISHED):
+        raise UserError(f"networks: '{value}' is none of {TRAINED}, {PUBLISHED}")
+
+
+@cache
+def _read(path: Path) -> dict[str, PublishedNetwork]:
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))
+        return {entry.pop("fingerprint"): PublishedNetwork(**entry) for entry in entries}
+    except (OSError, ValueError, TypeError, KeyError):
+        raise _damaged(path) from None
+
+
+def _damaged(path: Path) -> UserError:
+    return UserError(f"{path}: missing or damaged; install the package again")
