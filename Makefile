@@ -1,9 +1,15 @@
-# A newcomer's two commands: `make reproduce` and `make test`.
+# A newcomer's commands: `make demo`, `make table` and `make test`; `make reproduce` trains all networks.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: reproduce test check lowest benchmarks docs clean
+.PHONY: demo table reproduce test check lowest benchmarks docs clean
+
+demo: $(VENV)/installed
+	$(BIN)/python -m avn.demo
+
+table: $(VENV)/installed
+	$(BIN)/python -m avn.reproduce networks=published
 
 reproduce: $(VENV)/installed
 	$(BIN)/python -m avn.reproduce

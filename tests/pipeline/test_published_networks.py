@@ -60,7 +60,7 @@ def test_a_published_network_is_the_trained_one_in_16_bits(shipped):
 
 def test_nothing_of_the_training_world_is_made(shipped, tmp_path):
     given = (*ROW, "networks=published", f"outputs={tmp_path}")
-    heard = [f"training.acoustics.{own.split('.')[1]}" for own in SMALL if "acoustics." in own]
+    heard = [f"training.acoustics.{own.split('.', 1)[1]}" for own in SMALL if "acoustics." in own]
     trained = ("+acoustics@training.acoustics=resonance", *heard)
     run = Evaluation(composed(*given, "acoustics=diffraction", *trained))
     made = [stage for stage in missing([run]) if isinstance(stage, DirectSound)]
