@@ -9,7 +9,7 @@ demo: $(VENV)/installed
 	$(BIN)/python -m avn.demo
 
 table: $(VENV)/installed
-	$(BIN)/python -m avn.reproduce networks=published
+	$(BIN)/python -m avn.reproduce networks=published seeds=0
 
 reproduce: $(VENV)/installed
 	$(BIN)/python -m avn.reproduce

@@ -3,9 +3,9 @@
     python scripts/ladder.py [KEY=VALUE ...]
 
 The settings are those of `avn.eval` and hold for every line, for example `acoustics=diffraction
-subset=validation`. `seeds=0,1,2` names the seeds of the episodes, each with the networks of the
-same `train_seed`; it is 0 by default. Success rate and SPL are means over them. Runs and networks
-that exist are read.
+subset=validation`. `seeds=0,1,2` and `train_seeds=0,1,2` name the seeds of the episodes and of the
+networks, of which success rate and SPL are means; both are 0 by default. Runs and networks that
+exist are read.
 """
 
 from __future__ import annotations
@@ -39,25 +39,33 @@ LADDERS = {
 }
 
 
-def rates(agent: str, settings: Sequence[str], seeds: str) -> np.ndarray:
+def rates(agent: str, settings: Sequence[str], seeds: str, train_seeds: str) -> np.ndarray:
     """Return success rate and SPL in % of each network, apartments with equal weight, (N, 2)."""
     found = []
-    for seed in seeds.split(","):
-        episodes = avn.evaluate(agent, [*settings, f"seed={seed}", f"train_seed={seed}"])
-        found.append(episodes.groupby("scene")[["success", "spl"]].mean().mean())
+    for train_seed in train_seeds.split(","):
+        runs = []
+        for seed in seeds.split(","):
+            given = [*settings, f"seed={seed}", f"train_seed={train_seed}"]
+            episodes = avn.evaluate(agent, given)
+            runs.append(episodes.groupby("scene")[["success", "spl"]].mean().mean())
+        found.append(np.mean(runs, axis=0))
     return 100 * np.array(found)
 
 
 def main(arguments: Sequence[str]) -> None:
     """Walk every line and print the tables."""
-    seeds, common = "0", []
+    options = dict.fromkeys(("seeds", "train_seeds"), "0")
+    common = []
     for argument in arguments:
         key, _, value = argument.partition("=")
-        if key == "seeds":
-            seeds = value
+        if key in options:
+            options[key] = value
         else:
             common.append(argument)
-    print(f"{' '.join(common) or 'defaults'}; seed and train_seed {seeds}\n")
+    print(
+        f"{' '.join(common) or 'defaults'}; seeds {options['seeds']}; "
+        f"train_seed {options['train_seeds']}\n"
+    )
     for agent, lines in LADDERS.items():
         print(f"| `{agent}` and | setting | success / SPL |\n| --- | --- | --- |")
         settings: list[str] = []
@@ -65,7 +73,7 @@ def main(arguments: Sequence[str]) -> None:
             settings += [setting] if setting else []
             if setting.startswith("localisation=") and OF_RETRIEVAL in settings:
                 settings.remove(OF_RETRIEVAL)
-            each = rates(agent, [*common, *settings], seeds)
+            each = rates(agent, [*common, *settings], **options)
             spread = ""
             if len(each) > 1:
                 spread = " (networks " + ", ".join(f"{a:.1f} / {b:.1f}" for a, b in each) + ")"

@@ -11,7 +11,7 @@ from avn.config.spare import compose_fitting
 from avn.core.errors import UserError
 
 # Overrides of `avn.reproduce` itself.
-_OWN = ("rows", "seeds", "train_seeds", "paired", "sounds", "experiment")
+_OWN = ("rows", "seeds", "train_seeds", "sounds", "experiment")
 
 
 def compose_row(cfg: DictConfig, row: str) -> DictConfig:

@@ -231,7 +231,6 @@ class ReproduceConfig(CoreConfig):
     sounds: list[str] = MISSING
     seeds: list[int] = MISSING
     train_seeds: list[int] = MISSING
-    paired: bool = MISSING
 
 
 # Schema that all options of a group share.

@@ -60,15 +60,12 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig], defaults: Sequence[Di
     for key in ("rows", "seeds", "train_seeds"):
         if not cfg[key]:
             raise UserError(f"{key}: empty; give at least one, such as rows=greedy seeds=0")
-    seeds, networks = len(set(cfg.seeds)), len(set(cfg.train_seeds))
-    if cfg.paired and seeds != networks:
-        raise UserError(f"paired: {seeds} seeds and {networks} train_seeds; give as many of each")
     configs = [config for row in rows for config in _runs(cfg, row)]
     paper = paper_sounds_by_agent(rows, defaults)
     folders = _make_runs(configs, paper)
     tables, episodes = zip(*map(read_run, folders), strict=True)
-    drawn = [config.train_seed for config in configs]
-    runs, records = (_with_networks(own, drawn) for own in (tables, episodes))
+    networks = [config.train_seed for config in configs]
+    runs, records = (_with_networks(own, networks) for own in (tables, episodes))
     privileged = {agent_label(config) for config in configs if config.agent.privileged}
     cells = published.published(records, paper)
     caption = _caption(rows, defaults)
@@ -89,7 +86,7 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig], defaults: Sequence[Di
 
 def settings_of(rows: Sequence[DictConfig]) -> set[str]:
     """Return the leaf keys of the config that a row or the command itself reads."""
-    keys = {"rows", "sounds", "seeds", "train_seeds", "paired"}
+    keys = {"rows", "sounds", "seeds", "train_seeds"}
     return keys.union(*(Evaluation(row).read() for row in rows))
 
 
@@ -154,18 +151,16 @@ def _average(folders: Sequence[Path]) -> str:
 
 def _runs(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:
     """Return the configs of a row: one per seed, and per train_seed where it has networks."""
-    seeds, networks = list(dict.fromkeys(cfg.seeds)), list(dict.fromkeys(cfg.train_seeds))
+    networks = list(dict.fromkeys(cfg.train_seeds))
     if "train_seed" not in Evaluation(composed).read():
         networks = [composed.train_seed]
-    elif cfg.paired:
-        return [_run(composed, *pair) for pair in zip(seeds, networks, strict=True)]
-    return [_run(composed, seed, train_seed) for seed in seeds for train_seed in networks]
-
-
-def _run(composed: DictConfig, seed: int, train_seed: int) -> DictConfig:
-    config = copy.deepcopy(composed)  # composing anew is slow
-    config.seed, config.train_seed = seed, train_seed
-    return config
+    runs = []
+    for seed in dict.fromkeys(cfg.seeds):
+        for train_seed in networks:
+            config = copy.deepcopy(composed)  # composing anew is slow
+            config.seed, config.train_seed = seed, train_seed
+            runs.append(config)
+    return runs
 
 
 def _with_networks(tables: Sequence[pd.DataFrame], networks: Sequence[int]) -> pd.DataFrame:
