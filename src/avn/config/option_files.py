@@ -5,6 +5,7 @@ It reads the package's config files and those of the user's folders (`--config-d
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,6 +28,9 @@ from avn.core.errors import UserError
 
 # Config folders of the current command line.
 _folders: list[str] = []
+# Files of the package as they were read, by path, time of change and size: one command composes
+# several configs.
+_read_before: dict[tuple[Path, int, int], ConfigResult] = {}
 
 
 def take_folders(arguments: list[str]) -> list[str]:
@@ -81,6 +85,16 @@ class OptionFiles(ConfigSource):
 
     def load_config(self, config_path: str) -> ConfigResult:
         """Read a config file, refuse former names, and add the schema of each option."""
+        path = (Path(self.path) / self._normalize_file_name(config_path)).resolve()
+        if not path.is_relative_to(conf_folder().resolve()):
+            return self._load(config_path)  # a class of the user's own may have changed too
+        status = path.stat()
+        key = path, status.st_mtime_ns, status.st_size
+        if key not in _read_before:
+            _read_before[key] = self._load(config_path)
+        return copy.deepcopy(_read_before[key])  # Hydra changes what it is given
+
+    def _load(self, config_path: str) -> ConfigResult:
         result = self._files.load_config(config_path)
         node = result.config
         if not isinstance(node, DictConfig):

@@ -22,6 +22,7 @@ def register() -> None:
     OmegaConf.register_new_resolver("row_of_policy", row_of_policy, replace=True)
     store = ConfigStore.instance()
     for command, schema in COMMANDS.items():
-        store.store(name=f"{command}_schema", node=schema)
+        if f"{command}_schema.yaml" not in store.repo:
+            store.store(name=f"{command}_schema", node=schema)
     for plugin in (*audio_source.PLUGINS, *option_files.PLUGINS):
         Plugins.instance().register(plugin)

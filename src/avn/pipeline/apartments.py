@@ -23,7 +23,7 @@ from avn.apartments.settings import SplitConfig
 from avn.apartments.splits import DEFAULTS, PARTS, load_split
 from avn.core.errors import UserError
 from avn.core.files import check_name, partial_folder
-from avn.core.hashing import digest
+from avn.core.hashing import canonical, digest
 from avn.core.settings import typed
 from avn.pipeline.stage import Stage
 
@@ -132,7 +132,7 @@ _HASHES: dict[int, tuple[FloorPlan, str]] = {}
 
 def _plans(split: DictConfig) -> Mapping[str, list[FloorPlan]]:
     # stages ask for the same plans many times in one command
-    key = OmegaConf.to_yaml(split, resolve=True)
+    key = canonical(split)
     if key not in _READ:
         _READ[key] = load_split(typed(split))
     return _READ[key]
