@@ -86,7 +86,7 @@ class OptionFiles(ConfigSource):
     def load_config(self, config_path: str) -> ConfigResult:
         """Read a config file, refuse former names, and add the schema of each option."""
         path = (Path(self.path) / self._normalize_file_name(config_path)).resolve()
-        if not path.is_relative_to(conf_folder().resolve()):
+        if not path.is_relative_to(conf_folder().resolve()) or not path.is_file():
             return self._load(config_path)  # a class of the user's own may have changed too
         status = path.stat()
         key = path, status.st_mtime_ns, status.st_size
