@@ -32,12 +32,7 @@ PLANNERS = ("ours_noexp", "plan_noexp")
 WORLDS = ("acoustics=diffraction", "acoustics=resonance")
 # Settings of `avn.eval`; rows with exploration have the same networks.
 RUNS = [
-    *(
-        [f"agent={row}", world, protocol]
-        for protocol in ("protocol=stop", "protocol=var")
-        for world in WORLDS
-        for row in PLANNERS
-    ),
+    *([f"agent={row}", world] for world in WORLDS for row in PLANNERS),
     *([f"agent={row}", "acoustics=resonance"] for row in ACTOR_CRITICS),
 ]
 # Networks drawn by further values of `train_seed`.
