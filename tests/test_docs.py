@@ -149,6 +149,8 @@ def compose(line, monkeypatch, outputs):
     if name in ("figures", "report", "compare", "ls", "rm"):
         importlib.import_module(f"avn.{name}")._parse(arguments)
         return 0
+    if name == "demo":
+        name, arguments = "eval", ["experiment=demo", *arguments]
     if "experiment=" in rest:  # its jobs are in `tests/config/test_experiments.py`
         arguments.append("hydra.mode=RUN")
     monkeypatch.setattr(sys, "argv", [f"avn.{name}", *arguments, f"outputs={outputs}"])

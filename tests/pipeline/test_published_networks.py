@@ -64,7 +64,7 @@ def test_nothing_of_the_training_world_is_made(shipped, tmp_path):
     trained = ("+acoustics@training.acoustics=resonance", *heard)
     run = Evaluation(composed(*given, "acoustics=diffraction", *trained))
     made = [stage for stage in missing([run]) if isinstance(stage, DirectSound)]
-    assert [stage.apartments.name for stage in made] == ["test"]
+    assert [stage.apartments.subset for stage in made] == ["test"]
     assert not [stage for stage in missing([run]) if isinstance(stage, Trained)]
 
 

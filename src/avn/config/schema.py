@@ -231,6 +231,7 @@ class ReproduceConfig(CoreConfig):
     sounds: list[str] = MISSING
     seeds: list[int] = MISSING
     train_seeds: list[int] = MISSING
+    networks: str = MISSING
 
 
 # Schema that all options of a group share.
