@@ -21,20 +21,19 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]
     return folder, fit(*build(), folder, [SoundFigures()], loggers(folder, "tensorboard"))
 
 
-@pytest.mark.parametrize("rate", [8000, 48000])
-def test_it_does_at_another_sampling_rate(tmp_path: Path, rate: int) -> None:
+@pytest.mark.parametrize("rate", [8000, 16000, 48000])
+def test_training_lowers_the_error(tmp_path: Path, rate: int) -> None:
     metrics = fit(*build(rate, epochs=10), tmp_path)
-    assert metrics["loss/train"] < 0.8 * error_before(rate)
+    assert metrics["loss/train"] < 0.8 * error(rate)
     assert metrics["bearing_deg/train/all/all"] < 45  # 90 is chance
 
 
-def test_training_lowers_the_error(run: tuple[Path, dict[str, Any]]) -> None:
-    _, metrics = run
-    assert metrics["loss/train"] < error_before()
-    assert metrics["epochs"] == 4
+def test_training_ends_after_its_epochs(run: tuple[Path, dict[str, Any]]) -> None:
+    assert run[1]["epochs"] == 4
 
 
-def error_before(rate: int = 16000) -> float:
+def error(rate: int) -> float:
+    """Squared error on the training clips of an untrained network."""
     data, untrained = build(rate)
     batches = list(data.val_dataloader()[1])
     with torch.inference_mode():

@@ -35,7 +35,7 @@ class AudioEmbeddings(AudioInference):
     @property
     def title(self) -> str:
         """Title of the product, for messages."""
-        name, where = self.cfg.sound_model.name, self.apartments.title
+        name, where = self.cfg.sound_model.name, self.where
         return f"audio embeddings by '{name}' in {where} ({self.clips.purpose})"
 
     def by_products(self) -> Sequence[SourceEstimates]:

@@ -110,6 +110,12 @@ class AudioInference(ApartmentTensors):
         return forward
 
     @property
+    def where(self) -> str:
+        """Apartments and, where it changes the clips, the seed of the episodes; for titles."""
+        seed = "" if self.clips.seed is None else f", seed {self.clips.seed_of(self.cfg)}"
+        return f"{self.apartments.title}{seed}"
+
+    @property
     def realisations(self) -> int:
         """Number of realisations of each clip."""
         return int(OmegaConf.select(self.cfg, self.clips.realisations))

@@ -72,4 +72,4 @@ class SourceEstimates(AudioInference):
     @property
     def title(self) -> str:
         """Title of the product, for messages."""
-        return f"source estimates by '{self.cfg.sound_model.name}' in {self.apartments.title}"
+        return f"source estimates by '{self.cfg.sound_model.name}' in {self.where}"

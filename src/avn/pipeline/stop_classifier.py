@@ -142,4 +142,4 @@ class StopProbabilities(AudioInference):
     @property
     def title(self) -> str:
         """Title of the product, for messages."""
-        return f"stop probabilities by '{self.cfg.stop_model.name}' in {self.apartments.title}"
+        return f"stop probabilities by '{self.cfg.stop_model.name}' in {self.where}"
