@@ -10,11 +10,11 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from avn.core.errors import UserError
-from avn.core.hashing import file_hash
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -65,7 +65,7 @@ class PublishedNetwork:
             content = self.path.read_bytes()
         except OSError:
             raise _damaged(self.path) from None
-        if file_hash(self.path) != self.sha256:
+        if sha256(content).hexdigest() != self.sha256:
             raise _damaged(self.path)
         return {
             name: own.float() if own.is_floating_point() else own

@@ -111,6 +111,11 @@ class Trained(Stage):
         """Return whether the training is finished; a published network is."""
         return self.published is not None or (self.folder / METRICS).is_file()
 
+    def discard(self) -> None:
+        """Delete the training, so that it is made anew; a published network stays."""
+        if not self.published:
+            super().discard()
+
     def begun(self) -> bool:
         """Return whether an interrupted training has left a checkpoint."""
         return (self.folder / LAST).is_file()
