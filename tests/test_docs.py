@@ -166,6 +166,17 @@ def test_commands_compose(line, monkeypatch, tmp_path, capsys):
     assert code == 0, capsys.readouterr().err
 
 
+def test_the_table_of_groups_has_every_option():
+    table = dict(
+        re.findall(r"^\| `(\w+)` \| (.*?) \|", (TOP / "docs/architecture.md").read_text(), re.M)
+    )
+    groups = [group for group in table if (TOP / "conf" / group).is_dir()]
+    assert len(groups) > 20
+    for group in set(groups) - {"experiment", "model"}:  # described in words
+        options = {path.stem for path in (TOP / "conf" / group).glob("*.yaml")}
+        assert options <= set(re.findall(r"`(\w+)`", table[group])), group
+
+
 def test_there_are_commands_to_check():
     assert len(commands()) > 15
     assert {LINE.match(line)[2] for line in commands()} == set(COMMANDS)
