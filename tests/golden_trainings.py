@@ -37,9 +37,10 @@ def occupancy(name: str = "small") -> list[torch.Tensor]:
     if name == "small":
         config.net.widths, config.net.decoder, config.net.cell = [8, 8, 8, 8], 8, 16
     else:
-        config.net.widths, config.net.hidden = [4, 4], 16
+        config.net.widths, config.net.hidden = [4, 4], [16]
     views = [synthetic_views(60, 0)], [synthetic_views(40, 1)]
-    return _fitted(ViewData(*views, typed(config)), build_object("occupancy_model", config))
+    network = build_object("occupancy_model", config, camera={"size": 32})
+    return _fitted(ViewData(*views, typed(config)), network)
 
 
 def a3c() -> list[torch.Tensor]:
