@@ -1,4 +1,4 @@
-"""Numerics: the fastest arithmetic of a processor, or one that is the same on all x86-64 processors.
+"""Numerics: the fastest arithmetic of a processor, or one that all x86-64 processors share.
 
 The libraries choose their kernels by the processor, and kernels add in different orders or use
 approximations that processors round differently. `portable` chooses kernels that do not depend on
