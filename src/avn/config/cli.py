@@ -102,7 +102,7 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
     def checked(cfg: DictConfig) -> Path | None:
         name_files(cfg)
         check_keys(cfg)
-        numerics.use(cfg.numerics)
+        numerics.use(cfg.numerics, sweeps.forget)
         return task(cfg)
 
     job.__module__ = name

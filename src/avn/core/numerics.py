@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from avn.core.errors import UserError
 
@@ -31,8 +31,15 @@ ENVIRONMENT = {
 }
 
 
-def use(numerics: str) -> None:
+def use(numerics: str, leave: Callable[[], None] = lambda: None) -> None:
     """Set the numerics of this process; `portable` may replace it by a new one of the same command.
+
+    Parameters
+    ----------
+    numerics : str
+        `native` or `portable`.
+    leave : callable
+        Called before the process is replaced, to remove its temporary files.
 
     Raises
     ------
@@ -43,13 +50,14 @@ def use(numerics: str) -> None:
         raise UserError(f"numerics: '{numerics}' is none of {NATIVE}, {PORTABLE}")
     if numerics == PORTABLE:
         _check_machine()
-        if not _prepared():
+        if not is_portable():
+            leave()
             sys.stdout.flush()
             sys.stderr.flush()
             command = [sys.executable, *sys.orig_argv[1:]]
             os.execve(sys.executable, command, os.environ | ENVIRONMENT)
         restrict_if_portable()
-    elif _prepared():
+    elif is_portable():
         raise UserError(
             "numerics: native and portable in one sweep; give one of them, for the libraries are "
             "loaded once"
@@ -77,7 +85,7 @@ def require(numerics: str) -> None:
     UserError
         If they differ.
     """
-    if numerics != (PORTABLE if _prepared() else NATIVE):
+    if numerics != (PORTABLE if is_portable() else NATIVE):
         raise UserError(
             f"numerics: {numerics} can only be set where Python starts; use the command line, such "
             f"as python -m avn.train numerics={numerics}"
@@ -86,7 +94,7 @@ def require(numerics: str) -> None:
 
 def restrict_if_portable() -> None:
     """Restrict PyTorch to portable kernels if the environment of this process says so."""
-    if not _prepared():
+    if not is_portable():
         return
     import torch
 
@@ -103,7 +111,8 @@ def restrict_if_portable() -> None:
     replace_functions()
 
 
-def _prepared() -> bool:
+def is_portable() -> bool:
+    """Return whether this process has the environment of portable numerics."""
     return all(os.environ.get(name) == value for name, value in ENVIRONMENT.items())
 
 
