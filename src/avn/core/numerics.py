@@ -105,7 +105,7 @@ def restrict_if_portable() -> None:
             "numerics: portable needs a processor with AVX2 and FMA and a PyTorch with MKL; give "
             "numerics=native"
         )
-    # oneDNN and NNPACK choose blocks and instructions by the processor and its caches
+    # oneDNN and NNPACK choose blocks and instructions by the processor
     torch.backends.mkldnn.set_flags(False)
     torch.backends.nnpack.set_flags(False)
     replace_functions()

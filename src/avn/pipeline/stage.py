@@ -136,8 +136,12 @@ class Stage(ABC):
     def fingerprint(self) -> str:
         """SHA-256 of all that the product depends on, in hex."""
         needed = [need.fingerprint for need in self.needed]
-        numerics = [] if self.cfg.numerics == NATIVE else [self.cfg.numerics]
-        return digest(self.kind, self.version, self.inputs(), self.content(), needed, *numerics)
+        own = (self.kind, self.version, self.inputs(), self.content())
+        return digest(*own, needed, *self.numerics())
+
+    def numerics(self) -> list[str]:
+        """Return the numerics for the fingerprint, where they are not the default."""
+        return [] if self.cfg.numerics == NATIVE else [str(self.cfg.numerics)]
 
     def inputs(self) -> list[Any]:
         """Return the values of the settings, and hashes of the classes from outside among them."""
