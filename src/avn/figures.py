@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avn.config.cli import plainly
+from avn.core.numerics import use_of_runs
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,6 +39,7 @@ def _draw(options: argparse.Namespace) -> None:
     from avn.pipeline.run_figures import draw_runs
 
     configs = [(folder, read_config(folder)) for folder in options.runs]
+    use_of_runs([cfg.numerics for _, cfg in configs])
     runs = [replay.open_run(folder, cfg, default_config(cfg)) for folder, cfg in configs]
     draw_runs(runs, options.show, options.count, options.episode)
 

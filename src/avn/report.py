@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from avn.config.cli import plainly
+from avn.core.numerics import use_of_runs
 from avn.core.progress import log
 
 
@@ -50,6 +51,7 @@ def _report(options: argparse.Namespace) -> None:
     from avn.pipeline.report_page import write_page
 
     configs = [(folder, read_config(folder)) for folder in options.runs]
+    use_of_runs([cfg.numerics for _, cfg in configs])
     runs = [replay.open_run(folder, cfg, default_config(cfg)) for folder, cfg in configs]
     log(str(write_page(runs, options.episodes, options.show, options.paths, options.output)))
 

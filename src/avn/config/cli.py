@@ -28,6 +28,7 @@ from avn.config.audio_source import name_files, quoted
 from avn.config.folder import conf_folder, without_folders
 from avn.config.help import help_text, is_asked
 from avn.config.option_files import option_names
+from avn.core import numerics
 from avn.core.errors import UserError
 from avn.core.files import write_failure
 from avn.core.signals import exit_code_of
@@ -101,6 +102,7 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
     def checked(cfg: DictConfig) -> Path | None:
         name_files(cfg)
         check_keys(cfg)
+        numerics.use(cfg.numerics, sweeps.forget)
         return task(cfg)
 
     job.__module__ = name

@@ -12,6 +12,7 @@ from omegaconf import DictConfig
 from avn.config import option_files, registry
 from avn.config.cli import arrange, check_keys, explain
 from avn.config.folder import conf_folder
+from avn.core import numerics
 from avn.core.errors import UserError
 
 
@@ -59,6 +60,7 @@ def compose_command(command: str, overrides: Sequence[str]) -> tuple[DictConfig,
         with composing():
             cfg = compose(command, overrides=given)
         check_keys(cfg)
+        numerics.require(cfg.numerics)
     except Exception as error:
         line = explain(error, composed=False)
         raise UserError(line or str(error)) from None

@@ -180,6 +180,7 @@ class CoreConfig:
     localisation: str = MISSING
     realisations: int = MISSING
     train_seed: int = MISSING
+    numerics: str = MISSING
     trainer: TrainerConfig = MISSING
     logger: dict[str, Any] = MISSING
     callbacks: dict[str, Any] = MISSING

@@ -9,6 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import TypeVar
 
 from avn.core.errors import UserError
+from avn.core.numerics import restrict_if_portable
 from avn.core.signals import leave_to_parent
 
 Job = TypeVar("Job")
@@ -45,7 +46,7 @@ def in_processes(
     others = set(multiprocessing.active_children())
     try:
         pool = ProcessPoolExecutor(
-            min(processes, len(jobs)), mp_context=context, initializer=leave_to_parent
+            min(processes, len(jobs)), mp_context=context, initializer=_begin
         )
     except OSError as error:
         raise no_processes("processes", error) from error
@@ -64,6 +65,11 @@ def in_processes(
             for process in set(multiprocessing.active_children()) - others:
                 process.kill()
             raise
+
+
+def _begin() -> None:
+    leave_to_parent()
+    restrict_if_portable()
 
 
 def no_processes(option: str, error: OSError) -> UserError:

@@ -22,6 +22,7 @@ from lightning.pytorch.profilers import (
 )
 
 from avn.core.errors import UserError
+from avn.core.numerics import is_portable
 from avn.modules.settings import TrainerConfig
 
 PROFILERS: dict[str, type[Profiler]] = {
@@ -39,6 +40,8 @@ _PRECISIONS = {
     "bf16": "bf16-mixed",
     "16": "16-mixed",
 }
+# Device and number format of `numerics=portable`.
+_PORTABLE = ("cpu", "32-true")
 
 
 def check_trainer(settings: TrainerConfig) -> None:
@@ -75,6 +78,10 @@ def check_trainer(settings: TrainerConfig) -> None:
         raise UserError(
             f"trainer.precision: {settings.precision} is not possible with this device; give "
             f"{trainer.precision} or 32-true"
+        )
+    if is_portable() and (trainer.strategy.root_device.type, trainer.precision) != _PORTABLE:
+        raise UserError(
+            "numerics: portable needs trainer.accelerator=cpu and trainer.precision=32-true"
         )
 
 

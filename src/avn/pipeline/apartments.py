@@ -193,6 +193,7 @@ class PerApartment(Stage):
                 self.content(),
                 self.content_of(plan),
                 [_of_apartment(need, self.apartments, index) for need in needs],
+                *self.numerics(),
             )
             for index, plan in enumerate(plans)
         ]

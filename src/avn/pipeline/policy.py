@@ -15,6 +15,7 @@ from avn.agents.actor_critic import ActorCriticAgent
 from avn.core.classes import import_class
 from avn.core.errors import UserError
 from avn.core.files import check_name
+from avn.core.numerics import PORTABLE
 from avn.core.progress import log
 from avn.core.settings import plain
 from avn.mapping.ego_map import EgoMap
@@ -78,6 +79,11 @@ class Policy(Trained):
         super().check()
         check_name("agent.name", self.cfg.agent.name)
         recipe = build_algorithm(self.cfg)
+        if self.cfg.numerics == PORTABLE and getattr(recipe, "update_order", "") == "free":
+            raise UserError(
+                "numerics: portable needs algorithm.update_order=round_robin, for with free the "
+                "weights depend on which worker is faster"
+            )
         if self.start is not None and not self.begun():
             from avn.rl.checkpoints import read_start
 

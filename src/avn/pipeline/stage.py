@@ -22,6 +22,7 @@ from omegaconf import DictConfig
 from avn.core.errors import UserError
 from avn.core.files import locked, writing
 from avn.core.hashing import digest
+from avn.core.numerics import NATIVE
 from avn.core.progress import format_duration, log, working
 from avn.core.settings import leaves, values
 from avn.core.sources import outside_sources
@@ -135,7 +136,12 @@ class Stage(ABC):
     def fingerprint(self) -> str:
         """SHA-256 of all that the product depends on, in hex."""
         needed = [need.fingerprint for need in self.needed]
-        return digest(self.kind, self.version, self.inputs(), self.content(), needed)
+        own = (self.kind, self.version, self.inputs(), self.content())
+        return digest(*own, needed, *self.numerics())
+
+    def numerics(self) -> list[str]:
+        """Return the numerics for the fingerprint, where they are not the default."""
+        return [] if self.cfg.numerics == NATIVE else [str(self.cfg.numerics)]
 
     def inputs(self) -> list[Any]:
         """Return the values of the settings, and hashes of the classes from outside among them."""
@@ -159,7 +165,7 @@ class Stage(ABC):
 
     def read_here(self) -> set[str]:
         """Return the leaf keys of the config that this stage reads, without its dependencies."""
-        keys = (*MACHINE, *self.settings(), *self.consulted())
+        keys = (*MACHINE, "numerics", *self.settings(), *self.consulted())
         return leaves(self.cfg, keys, self.ignored())
 
 

@@ -17,6 +17,7 @@ import torch
 
 from avn.core.errors import UserError
 from avn.core.files import writing
+from avn.core.numerics import restrict_if_portable
 from avn.core.processes import no_processes
 from avn.core.progress import log
 from avn.core.signals import leave_to_parent
@@ -209,6 +210,7 @@ def _work(
 ) -> None:
     """Run rounds in a process until it is ended."""
     leave_to_parent()
+    restrict_if_portable()
     torch.set_num_threads(1)
 
     def lock() -> AbstractContextManager[None]:
