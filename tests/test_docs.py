@@ -1,7 +1,6 @@
 """What the documents say can be followed: links lead somewhere, and commands compose."""
 
 import importlib
-import os
 import re
 import shlex
 import sys
@@ -13,6 +12,7 @@ from avn.__main__ import COMMANDS
 from avn.config import cli
 from avn.config.folder import conf_folder
 from avn.config.renamed import OPTIONS
+from avn.core import numerics
 
 TOP = Path(__file__).parents[1]
 CHANGELOG = TOP / "CHANGELOG.md"
@@ -155,7 +155,7 @@ def compose(line, monkeypatch, outputs):
     if "experiment=" in rest:  # its jobs are in `tests/config/test_experiments.py`
         arguments.append("hydra.mode=RUN")
     monkeypatch.setattr(sys, "argv", [f"avn.{name}", *arguments, f"outputs={outputs}"])
-    monkeypatch.setattr(os, "execve", lambda *_: None)  # `numerics=portable` starts itself again
+    monkeypatch.setattr(numerics, "use", lambda *_: None)  # `portable` would start pytest again
     return cli.command(name)(lambda cfg: None)()
 
 
