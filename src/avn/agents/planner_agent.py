@@ -158,7 +158,7 @@ class PlannerAgent(Agent):
     def act(self, observation: TensorDict) -> Tensor:
         """Choose an action for every episode along the newest path. See `Agent.act`."""
         self.mapper.observe(observation, self._direction)
-        self._update_source(observation["source_estimate"], self._active)
+        self._update_source(observation, self._active)
         actions = self._planned(self._active)
         spins = self._turns >= 2 * self.max_rotations
         if self.look == "around":
@@ -166,15 +166,21 @@ class PlannerAgent(Agent):
             spins = self._turns >= 2 * self.max_rotations + HEADINGS
         actions = torch.where(spins, FORWARD, actions)
         if self.protocol.requires_stop:
-            actions = torch.where(observation["stop_probability"] >= self.stop_at, STOP, actions)
+            actions = torch.where(self._stops(observation), STOP, actions)
         self._direction = torch.where(
             actions == FORWARD, 0, torch.where(actions == BACKWARD, 2, -1)
         )
         self._turns = torch.where(self._direction >= 0, 0, self._turns + 1)
         return actions
 
-    def _update_source(self, estimate: Tensor, active: np.ndarray) -> None:
+    def _stops(self, observation: TensorDict) -> Tensor:
+        """Return which agents stop, (N,) bool; for protocols with Stop."""
+        stops: Tensor = observation["stop_probability"] >= self.stop_at
+        return stops
+
+    def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
         """Update the belief of the source with the newest estimates, in the frame of the map."""
+        estimate = observation["source_estimate"]
         pose, graph = self.mapper.pose, self.mapper.graph
         if self._source_belief is None:
             self._source_belief = SourceBelief(
@@ -190,11 +196,14 @@ class PlannerAgent(Agent):
         # with Stop has none in the agent's own cell.
         self._source_belief.rule_out(position, self._near, active)
 
+    def _targets(self, active: np.ndarray) -> np.ndarray:
+        """Return the square where each agent looks for the source next, (N, 2) int64."""
+        assert self._source_belief is not None
+        return self._source_belief.targets(self.mapper.graph.cost, active)
+
     def _planned(self, active: np.ndarray) -> Tensor:
         """Return the first action of the shortest path, and a turn if there is none."""
-        assert self._source_belief is not None
-        graph, source_belief = self.mapper.graph, self._source_belief
-        target = source_belief.targets(graph.cost, active)
+        graph, target = self.mapper.graph, self._targets(active)
         action, _, _ = first_actions(
             graph.cost,
             graph.walls,

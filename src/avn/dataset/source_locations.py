@@ -25,6 +25,11 @@ def relative_locations(lattice: Tensor, sources: Tensor) -> Tensor:
         Metres to the right and to the front of an agent in state 4 x cell + heading.
     """
     east, north = ((lattice[sources][:, None] - lattice[None]) * CELL).float().unbind(-1)
+    return to_headings(east, north)
+
+
+def to_headings(east: Tensor, north: Tensor) -> Tensor:
+    """Rotate offsets (K, C) to the east and north to right and front in all states, (K, 4 C, 2)."""
     right = torch.stack((east, -north, -east, north), -1)
     front = torch.stack((north, east, -north, -east), -1)
     return torch.stack((right, front), -1).flatten(1, 2)

@@ -129,9 +129,22 @@ class AudioNetwork(Network):
             self.spectrogram.bands,
             self.spectrogram.frames,
         )
-        outputs = len(self.mirror_signs)
-        built = self.build("net", channels=channels, height=size[0], width=size[1], outputs=outputs)
+        shape = {"channels": channels, "height": size[0], "width": size[1]}
+        built = self.build("net", **shape, outputs=self.outputs)
         self.net = built.to(memory_format=torch.channels_last)
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs of the last layer."""
+        return len(self.mirror_signs)
+
+    def mirror_outputs(self, outputs: Tensor) -> Tensor:
+        """Return the outputs (N, outputs) for clips with the ears exchanged."""
+        return outputs * outputs.new_tensor(self.mirror_signs)
+
+    def mirror_targets(self, target: Tensor) -> Tensor:
+        """Return the targets of clips with the ears exchanged; as outputs by default."""
+        return self.mirror_outputs(target)
 
     def forward(self, clips: Tensor) -> Tensor:
         """Map clips (N, 2, rate) float32 to outputs (N, outputs) float32."""
@@ -143,10 +156,10 @@ class AudioNetwork(Network):
             return self._net(pictures)
         both = torch.cat((pictures, self.spectrogram.mirror(pictures)))
         straight, mirrored = self._net(both).chunk(2)
-        return (straight + mirrored * mirrored.new_tensor(self.mirror_signs)) / 2
+        return (straight + self.mirror_outputs(mirrored)) / 2
 
     def random_flip(self, pictures: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
-        """Mirror spectrograms and targets (N, outputs) with probability 0.5 each.
+        """Mirror spectrograms and targets (N, ...) with probability 0.5 each.
 
         Without `flip_augmentation` nothing is mirrored.
         """
@@ -155,8 +168,7 @@ class AudioNetwork(Network):
         flipped = torch.rand(len(target)).lt(0.5).to(target.device)
         mirrored = self.spectrogram.mirror(pictures)
         pictures = torch.where(flipped[:, None, None, None], mirrored, pictures)
-        signs = target.new_tensor(self.mirror_signs)
-        return pictures, torch.where(flipped[:, None], target * signs, target)
+        return pictures, torch.where(flipped[:, None], self.mirror_targets(target), target)
 
     def _net(self, pictures: Tensor) -> Tensor:
         return self.net(pictures.contiguous(memory_format=torch.channels_last))

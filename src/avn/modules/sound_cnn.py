@@ -79,8 +79,12 @@ class SoundCnn(AudioNetwork):
         both = torch.cat((pictures, self.spectrogram.mirror(pictures)))
         hidden = net.hidden(both.contiguous(memory_format=torch.channels_last))
         straight, mirrored = net.answer(hidden).chunk(2)
-        location = (straight + mirrored * mirrored.new_tensor(self.mirror_signs)) / 2
-        return torch.cat((*hidden.chunk(2), location), dim=1)
+        outputs = (straight + self.mirror_outputs(mirrored)) / 2
+        return torch.cat((*hidden.chunk(2), self.location(outputs)), dim=1)
+
+    def location(self, outputs: Tensor) -> Tensor:
+        """Return the locations (N, 2) of outputs of the last layer, which are locations here."""
+        return outputs
 
     def name_sounds(self, sounds: Sequence[str]) -> None:
         """Set the names of the sounds, by index; metrics are grouped by them."""

@@ -17,6 +17,7 @@ from avn.dataset.scene import Scene
 from avn.dataset.source_locations import locate_sources
 from avn.navigation.observations import RenderedAudio, SceneObservations
 from avn.pipeline.apartments import Apartments
+from avn.pipeline.arrivals import ArrivalEstimates, hears_arrivals
 from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.occupancy import LocalPatches, has_occupancy_model, true_local_patches
@@ -98,6 +99,14 @@ OBSERVATIONS = {
         there=has_sound_model,
         truth="source_estimate",
         true=_true_estimates,
+    ),
+    "arrival": Observation(
+        shape="(B + 6,): how the sound arrives; see `avn.core.heard.Arrivals`",
+        hint="choose a sound model with heads, such as sound_model=arrival",
+        audio=True,
+        stage=ArrivalEstimates,
+        load=ArrivalEstimates.load,
+        there=hears_arrivals,
     ),
     "stop_probability": Observation(
         shape="(): probability that the source is within reach",

@@ -10,6 +10,7 @@ from omegaconf import DictConfig
 
 from avn.core.classes import build_object
 from avn.pipeline.audio_inference import AudioInference
+from avn.pipeline.scenes import acoustics_of
 from avn.pipeline.trained_on_clips import TrainedOnClips
 
 if TYPE_CHECKING:
@@ -44,9 +45,13 @@ class SoundNetwork(TrainedOnClips):
         return model
 
     def data(self) -> SoundData:
-        """Return the data module of clips and source locations."""
+        """Return the data module of clips and source locations, or arrivals for heads."""
+        from avn.datamodules.arrival import ArrivalData
         from avn.datamodules.sound import SoundData
+        from avn.modules.arrival_cnn import ArrivalCnn
 
+        if isinstance(self.untrained(), ArrivalCnn):
+            return ArrivalData(acoustics_of(self.train), **self.clips())
         return SoundData(**self.clips())
 
     def callbacks(self) -> Sequence[Callback]:

@@ -50,3 +50,56 @@ class SourceErrorModel:
             raise UserError(
                 "planner.error: sigma and outlier_prob are over 0, and front_back_prob is under 1"
             )
+
+
+@dataclass
+class ArrivalModel:
+    """Weights of what is heard, for `planner=belief`.
+
+    The log-posterior of a square is a sum over the last `places` squares at which the agent was. Of
+    each, it has the log-probability of the direction in which the shortest path to the square
+    leaves, and a Gaussian of the logarithm of the length of this path.
+
+    Attributes
+    ----------
+    places : int
+        Squares walked whose evidence is kept, 1 to 50.
+    kept : float
+        Share of the weight of evidence that is kept with each square walked, 0 to 1.
+    bearing_weight, distance_weight : float
+        Factors of the two terms, 0 to 100; below 1 because errors of nearby places are correlated.
+    blur : float
+        Share of a uniform distribution in that of the direction, more than 0 and below 1.
+    least_sigma : float
+        Least standard deviation of the log-length, more than 0 and up to 10.
+    reach : int
+        Length up to which paths are followed, in squares, 1 to 1000.
+
+    Raises
+    ------
+    UserError
+        If a setting is out of range.
+    """
+
+    places: int = 6
+    kept: float = 0.7
+    bearing_weight: float = 1.0
+    distance_weight: float = 1.0
+    blur: float = 0.1
+    least_sigma: float = 0.1
+    reach: int = 60
+
+    def __post_init__(self) -> None:
+        """Check the settings."""
+        limits = {
+            "places": (1, 50),
+            "kept": (0, 1),
+            "bearing_weight": (0, 100),
+            "distance_weight": (0, 100),
+            "blur": (1e-6, 0.999),
+            "least_sigma": (1e-3, 10),
+            "reach": (1, 1000),
+        }
+        for key, (least, most) in limits.items():
+            if not least <= getattr(self, key) <= most:
+                raise UserError(f"planner.model.{key}: {getattr(self, key)}; give {least} to {most}")

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.errors import UserError
+from avn.planning.searched import rule_out
 from avn.planning.settings import SourceErrorModel
 
 FILTERS = ("latest", "bayes")
@@ -74,22 +75,8 @@ class SourceBelief:
             _weigh(self._log_belief, position, source_estimate, mirror_image, active, own)
 
     def rule_out(self, position: NDArray[np.int64], reach: int, rows: NDArray[np.bool_]) -> None:
-        """Mark the squares around agents as searched.
-
-        Parameters
-        ----------
-        position : (N, 2) int64
-            Column and row of the agents.
-        reach : int
-            Squares around the agent, including diagonals.
-        rows : (N,) bool
-            Agents to update.
-        """
-        chosen = np.flatnonzero(rows)
-        size = self.searched.shape[1]
-        around = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 2), -1).reshape(-1, 2)
-        squares = np.clip(position[chosen, None] + around, 0, size - 1)
-        self.searched[chosen[:, None], squares[..., 1], squares[..., 0]] = True
+        """Mark the squares around agents as searched. See `rule_out`."""
+        rule_out(self.searched, position, reach, rows)
 
     def targets(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Choose the node where each agent looks for the source next.

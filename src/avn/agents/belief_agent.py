@@ -1,0 +1,96 @@
+"""Agent that keeps a posterior of the source on its map, from the arrival of the sound."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from avn.agents.planner_agent import PlannerAgent
+from avn.core.errors import UserError
+from avn.core.heard import Arrivals
+from avn.mapping.base import Mapper
+from avn.navigation.protocols import Protocol
+from avn.planning.arrival_belief import ArrivalBelief
+from avn.planning.settings import ArrivalModel
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
+
+STOPS = ("belief", "classifier")
+# The squares nearer than 1 m: its own and the four beside it.
+_BESIDE = np.array([(0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)])
+
+
+class BeliefAgent(PlannerAgent):
+    """Agent that walks to the likeliest square of a posterior; see `ArrivalBelief`.
+
+    Parameters
+    ----------
+    mapper : Mapper
+        Builds the map and localises the agent.
+    model : ArrivalModel
+        Weights of the evidence.
+    stop_by : {"belief", "classifier"}
+        What the decision to stop rests on, for protocols with Stop: "belief" is the probability
+        that the source is at the agent's square or beside it, "classifier" that of the stop
+        classifier.
+    stop_at : float
+        Probability from which the agent stops, 0 to 1.
+    **planner
+        Other parameters of `PlannerAgent`, without those of its source filter.
+    """
+
+    def __init__(
+        self,
+        mapper: Mapper,
+        model: ArrivalModel | None = None,
+        stop_by: str = "belief",
+        stop_at: float = 0.5,
+        **planner: Any,
+    ) -> None:
+        super().__init__(mapper, stop_at=stop_at, **planner)
+        if stop_by not in STOPS:
+            raise UserError(f"planner.stop_by: '{stop_by}' is none of {', '.join(STOPS)}")
+        self.model, self.stop_by = model or ArrivalModel(), stop_by
+        self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
+
+    def wants(self, protocol: Protocol) -> tuple[str, ...]:
+        """Return the observations it needs under a protocol. See `Agent.wants`."""
+        classified = protocol.requires_stop and self.stop_by == "classifier"
+        return (*self.needs, "stop_probability") if classified else self.needs
+
+    def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
+        """Return the settings of the source filter, and those of Stop that do not count."""
+        classified = protocol.requires_stop and self.stop_by == "classifier"
+        stop = () if protocol.requires_stop else ("stop_by",)
+        at = ("stop_at",) if classified or not protocol.requires_stop else ()
+        return ("source_filter", "error", *stop, *at)
+
+    def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
+        """Begin N new episodes. See `Agent.reset`."""
+        super().reset(n, generator, protocol)
+        self._belief: ArrivalBelief | None = None
+
+    def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
+        heard = Arrivals(observation["arrival"].float())
+        pose, graph = self.mapper.pose.numpy(), self.mapper.graph
+        if self._belief is None:
+            self._belief = ArrivalBelief(self.n, graph.cost.shape[1], heard.bins, self.model)
+        belief = self._belief
+        belief.hear(pose, heard.bearing.numpy(), heard.distance.numpy(), active)
+        belief.rule_out(pose[:, :2], self._near, active)
+        belief.score(graph.cost, active)
+
+    def _targets(self, active: np.ndarray) -> np.ndarray:
+        assert self._belief is not None
+        return self._belief.targets(self.mapper.graph.cost, active)
+
+    def _stops(self, observation: TensorDict) -> Tensor:
+        if self.stop_by == "classifier":
+            return super()._stops(observation)
+        assert self._belief is not None
+        position = self.mapper.pose[:, :2].numpy()
+        return torch.from_numpy(self._belief.near(position, _BESIDE) >= self.stop_at)

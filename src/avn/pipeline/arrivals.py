@@ -1,0 +1,49 @@
+"""Stage of how the sound of every clip arrives, by a sound network with heads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import torch
+from omegaconf import DictConfig
+from torch import Tensor
+
+from avn.core.classes import import_class
+from avn.pipeline.audio_inference import AudioInference
+from avn.pipeline.sound_network import SoundNetwork, has_sound_model
+
+
+def hears_arrivals(cfg: DictConfig) -> bool:
+    """Return whether the config's sound network has heads."""
+    target = cfg.sound_model._target_
+    return has_sound_model(cfg) and hasattr(import_class("sound_model", target), "arrival")
+
+
+class ArrivalEstimates(AudioInference):
+    """Stage of the outputs of the heads for every clip.
+
+    The product is (K, S, sounds, realisations, bins + 6) float16 per apartment; see
+    `avn.core.heard.Arrivals`.
+    """
+
+    kind = "hear/arrivals"
+
+    @property
+    def network(self) -> SoundNetwork:
+        """Stage of the sound network."""
+        return SoundNetwork(self.cfg)
+
+    def output_of(self, model: Any) -> Callable[[Tensor], Tensor]:
+        """Return the function from clips to the outputs of the heads."""
+
+        def heads(clips: Tensor) -> Tensor:
+            found: Tensor = model.arrival(clips)
+            return found.to(torch.float16)
+
+        return heads
+
+    @property
+    def title(self) -> str:
+        """Title of the product, for messages."""
+        return f"arrivals by '{self.cfg.sound_model.name}' in {self.where}"

@@ -1,0 +1,120 @@
+import math
+
+import numpy as np
+import pytest
+
+from avn.core.errors import UserError
+from avn.planning.arrival_belief import ArrivalBelief
+from avn.planning.settings import ArrivalModel
+from avn.planning.sound_fields import SQUARES, sound_fields
+
+BINS, SIZE = 72, 41
+ALL = np.array([True])
+
+
+def rooms():
+    """Two rooms with a door between them; the agent's map knows them."""
+    cost = np.full((1, SIZE, SIZE), np.inf, np.float32)
+    cost[0, 10:20, 10:30] = cost[0, 21:31, 10:30] = 1
+    cost[0, 20, 27] = 1
+    return cost
+
+
+def heard(cost, pose, source, sigma=0.1):
+    """Bearing and distance that arrive at a pose from a source, exact within a bin."""
+    length, direction = np.empty(cost.shape, np.int16), np.empty(cost.shape, np.uint8)
+    sound_fields(cost, np.array([pose[:2]]), np.arange(1), 100, BINS, length, direction)
+    there = (0, source[1], source[0])
+    bearing = np.full((1, BINS), math.log(0.01 / BINS), np.float32)
+    local = (int(direction[there]) - pose[2] * BINS // 4) % BINS
+    bearing[0, local] = math.log(0.99)
+    metres = 0.5 * length[there] * SQUARES
+    return bearing, np.array([[math.log(metres), sigma]], np.float32)
+
+
+def walk(cost, poses, source, model=None, **more):
+    belief = ArrivalBelief(1, SIZE, BINS, model or ArrivalModel())
+    for pose in poses:
+        belief.hear(np.array([pose]), *heard(cost, pose, source, **more), ALL)
+    belief.score(cost, ALL)
+    return belief
+
+
+@pytest.mark.parametrize("heading", range(4))
+def test_one_place_finds_a_source_in_sight(heading):
+    found = walk(rooms(), [(12, 12, heading)], (20, 17)).targets(rooms(), ALL)[0]
+    assert np.abs(found - (20, 17)).max() <= 1
+
+
+def test_a_source_behind_a_wall_is_looked_for_through_the_door():
+    source = (12, 28)
+    belief = walk(rooms(), [(12, 12, 0), (13, 12, 1), (14, 12, 1)], source)
+    x, y = belief.targets(rooms(), ALL)[0]
+    assert y > 20, "beyond the wall"
+    # without the wall the same evidence points into the near room or beyond its right side
+    free = np.ones_like(rooms())
+    belief.score(free, ALL)
+    x, y = belief.targets(free, ALL)[0]
+    assert x > 27
+
+
+def test_two_bearings_cross_at_the_source():
+    model = ArrivalModel(distance_weight=0, kept=1)
+    source, cost = (25, 18), np.ones((1, SIZE, SIZE), np.float32)
+    found = walk(cost, [(10, 10, 0), (25, 10, 0)], source, model).targets(cost, ALL)[0]
+    assert np.abs(found - source)[0] <= 1 and abs(found[1] - 18) <= 2
+
+
+def test_evidence_is_scored_again_when_the_map_changes():
+    open_map = np.ones((1, SIZE, SIZE), np.float32)
+    belief = walk(open_map, [(20, 5, 0)], (20, 25))
+    before = belief.targets(open_map, ALL)[0]
+    assert np.array_equal(before, (20, 25))
+    walled = open_map.copy()
+    walled[0, 10, 5:36] = np.inf
+    belief.score(walled, ALL)
+    assert belief.targets(walled, ALL)[0][1] < 10, "what is straight ahead is on this side now"
+
+
+def test_forgotten_evidence_has_no_weight():
+    model = ArrivalModel(kept=0.0)
+    cost = np.ones((1, SIZE, SIZE), np.float32)
+    one = ArrivalBelief(1, SIZE, BINS, model)
+    one.hear(np.array([(10, 10, 0)]), *heard(cost, (10, 10, 0), (35, 35)), ALL)
+    other = ArrivalBelief(1, SIZE, BINS, model)
+    for belief in (one, other):
+        belief.hear(np.array([(20, 20, 0)]), *heard(cost, (20, 20, 0), (20, 30)), ALL)
+        belief.score(cost, ALL)
+    assert np.array_equal(one.log_belief, other.log_belief)
+
+
+def test_headings_at_one_place_agree_on_the_map():
+    cost, source = rooms(), (20, 17)
+    once = walk(cost, [(12, 12, 0)], source)
+    around = walk(cost, [(12, 12, h) for h in range(4)], source)
+    assert np.array_equal(once.targets(cost, ALL), around.targets(cost, ALL))
+    spread = [belief.near(np.array([source]), np.array([(0, 0)])) for belief in (once, around)]
+    assert spread[1] > spread[0], "four observations are surer than one"
+
+
+def test_the_probability_nearby_is_a_share_of_the_posterior():
+    cost, source = rooms(), (20, 17)
+    belief = walk(cost, [(12, 12, h) for h in range(4)], source)
+    everywhere = np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE)), -1).reshape(-1, 2)
+    assert belief.near(np.array([(0, 0)]), everywhere) == pytest.approx(1)
+
+
+def test_when_all_was_searched_the_search_begins_again():
+    cost = rooms()
+    belief = walk(cost, [(12, 12, 0)], (20, 17))
+    belief.searched[:] = True
+    belief.score(cost, ALL)
+    found = belief.targets(cost, ALL)[0]
+    assert np.isfinite(cost[0, found[1], found[0]])
+    assert not belief.searched.any()
+
+
+@pytest.mark.parametrize(("key", "value"), [("places", 0), ("kept", 1.5), ("blur", 0.0)])
+def test_settings_out_of_range_are_refused(key, value):
+    with pytest.raises(UserError, match=f"planner.model.{key}"):
+        ArrivalModel(**{key: value})
