@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-# Numbers behind the bins of the bearing: mean and standard deviation of the logarithm of the path's
-# length in metres, log-odds of being in sight, metres right and front, standard deviation in metres.
+# Numbers behind the bins of the bearing: mean and standard deviation of the logarithm of the length
+# of the path in metres, log-odds of being in sight, metres right and front, standard deviation.
 OTHERS = 6
 
 

@@ -146,12 +146,12 @@ class ArrivalCnn(SoundCnn):
         return (bearing + length + sight + 0.5 * place).mean()
 
     def label(self, arrival: Tensor) -> Tensor:
-        """Return the label of the direction of arrival (N, 2), probabilities of bins (N, bins)."""
+        """Return the label of the direction of arrival (N, 2 or more), probabilities of bins (N, bins)."""
         angle = torch.atan2(arrival[:, 0], arrival[:, 1])
         centres = torch.arange(self.bins, device=arrival.device) * (2 * math.pi / self.bins)
         close = torch.cos(angle[:, None] - centres) / self.spread**2
         label = close.softmax(1)
-        there = arrival.square().sum(1, keepdim=True) > 0
+        there = arrival[:, :2].square().sum(1, keepdim=True) > 0
         return torch.where(there, label, torch.full_like(label, 1 / self.bins))
 
     def name_sounds(self, sounds: Sequence[str]) -> None:

@@ -120,8 +120,16 @@ class ArrivalBelief:
         precision = model.distance_weight * weight[:, 0] * precision.sum(1) / heard.sum(1)
         begin = np.searchsorted(row, np.arange(len(cost) + 1))
         _score(
-            self.log_belief, cost, self.searched, active, begin, length, direction, bearing,
-            log_length.astype(np.float32), precision.astype(np.float32),
+            self.log_belief,
+            cost,
+            self.searched,
+            active,
+            begin,
+            length,
+            direction,
+            bearing,
+            log_length.astype(np.float32),
+            precision.astype(np.float32),
         )
 
     def rule_out(self, position: NDArray[np.int64], reach: int, rows: NDArray[np.bool_]) -> None:

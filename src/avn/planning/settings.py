@@ -102,4 +102,6 @@ class ArrivalModel:
         }
         for key, (least, most) in limits.items():
             if not least <= getattr(self, key) <= most:
-                raise UserError(f"planner.model.{key}: {getattr(self, key)}; give {least} to {most}")
+                raise UserError(
+                    f"planner.model.{key}: {getattr(self, key)}; give {least} to {most}"
+                )

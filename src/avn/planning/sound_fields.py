@@ -1,4 +1,4 @@
-"""Fields of sound on partial graphs: length and first direction of the shortest path to each square.
+"""Fields of sound on partial graphs: length and first direction of the path to each square.
 
 Sound that walls block arrives along the shortest path around them. For an agent at one square of
 its map, a field has for every other square the length of the shortest path to it, and the direction
