@@ -172,7 +172,7 @@ class SoundFigures(Callback):
             pairs = torch.nonzero(clips.in_sight == seen)[:1, 0]
             for index, sound in enumerate(clips.sounds.names if len(pairs) else ()):
                 batch = clips.__getitems__(clips.item(pairs, torch.tensor(index), 0).tolist())
-                right, front = batch["target"][0].tolist()
+                right, front = batch["target"][0, -2:].tolist()  # locations stand last
                 title = f"{sound} {sight}: {right:+.1f} m right, {front:+.1f} m front"
                 pictures = pl_module.spectrogram(batch["clips"].to(pl_module.device))[0].cpu()
                 tag = f"{sound}/{sight.replace(' ', '_')}"
@@ -204,7 +204,7 @@ class SoundFigures(Callback):
                 scene.plan,
                 scene.grid.lattice,
                 torch.cat(estimates).numpy(),
-                torch.cat([batch["target"] for batch in batches]).numpy(),
+                torch.cat([batch["target"][:, -2:] for batch in batches]).numpy(),
                 torch.cat([batch["in_sight"] for batch in batches]).numpy(),
                 f"{scene.name}, {sound}, epoch {epoch}",
             )
