@@ -22,9 +22,10 @@ def rooms():
 
 def heard(cost, pose, source, sigma=0.1):
     """Bearing and distance that arrive at a pose from a source, exact within a bin."""
-    length, direction = np.empty(cost.shape, np.int16), np.empty(cost.shape, np.uint8)
-    sound_fields(cost, np.array([pose[:2]]), np.arange(1), 100, BINS, length, direction)
-    there = (0, source[1], source[0])
+    length, direction = np.empty((1, *cost.shape), np.int16), np.empty((1, *cost.shape), np.uint8)
+    only = np.zeros(1, np.int64)
+    sound_fields(cost, np.array([[pose[:2]]]), only, only, 100, BINS, length, direction)
+    there = (0, 0, source[1], source[0])
     bearing = np.full((1, BINS), math.log(0.01 / BINS), np.float32)
     local = (int(direction[there]) - pose[2] * BINS // 4) % BINS
     bearing[0, local] = math.log(0.99)

@@ -11,11 +11,11 @@ BINS = 72
 
 
 def fields(cost, position, reach=100):
-    shape = (len(cost), *cost.shape[1:])
+    shape = (len(cost), 1, *cost.shape[1:])
     length, direction = np.empty(shape, np.int16), np.empty(shape, np.uint8)
-    rows = np.arange(len(cost))
-    sound_fields(cost, np.array(position), rows, reach, BINS, length, direction)
-    return length, direction
+    rows, first = np.arange(len(cost)), np.zeros(len(cost), np.int64)
+    sound_fields(cost, np.array(position)[:, None], rows, first, reach, BINS, length, direction)
+    return length[:, 0], direction[:, 0]
 
 
 def test_without_walls_a_path_leaves_towards_the_square():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numba
 import numpy as np
@@ -13,6 +14,13 @@ from avn.core.actions import HEADINGS
 from avn.planning.searched import rule_out
 from avn.planning.settings import ArrivalModel
 from avn.planning.sound_fields import SQUARES, sound_fields
+
+# Weight below which evidence is left out.
+_LEAST_WEIGHT = 1e-3
+# Length in units of `sound_fields` up to which logarithms are tabulated.
+_LENGTHS = 4096
+# Bound of what a wrong length costs, so that one outlier does not decide.
+_OUTLIER = 8.0
 
 
 class ArrivalBelief:
@@ -44,14 +52,19 @@ class ArrivalBelief:
         self.model, self.bins, slots = model, bins, model.places
         self.log_belief = np.zeros((n, size, size), dtype=np.float32)
         self.searched = np.zeros((n, size, size), dtype=np.bool_)
+        # a ring of places for each agent, and the place where it is now
+        self._newest = np.zeros(n, dtype=np.int64)
         self._position = np.full((n, slots, 2), -1, dtype=np.int64)
         self._weight = np.zeros((n, slots), dtype=np.float32)
         # sums over what was heard with each heading, and how often
         self._bearing = np.zeros((n, slots, HEADINGS, bins), dtype=np.float32)
         self._distance = np.zeros((n, slots, HEADINGS, 2), dtype=np.float32)
         self._count = np.zeros((n, slots, HEADINGS), dtype=np.float32)
+        # fields of the places, and whether they are those of the present graph
         self._length = np.zeros((n, slots, size, size), dtype=np.int16)
         self._direction = np.full((n, slots, size, size), bins, dtype=np.uint8)
+        self._valid = np.zeros((n, slots), dtype=np.bool_)
+        self._blocked = np.zeros((n, size, size), dtype=np.bool_)
 
     def hear(
         self,
@@ -74,21 +87,27 @@ class ArrivalBelief:
             Agents to update.
         """
         rows = np.flatnonzero(active)
-        moved = rows[(self._position[rows, 0] != pose[rows, :2]).any(1)]
-        for own in (self._position, self._weight, self._bearing, self._distance, self._count):
-            own[moved, 1:] = own[moved, :-1]
+        here = self._position[rows, self._newest[rows]]
+        moved = rows[(here != pose[rows, :2]).any(1)]
+        self._newest[moved] = (self._newest[moved] + 1) % self.model.places
         self._weight[moved] *= self.model.kept
-        self._position[moved, 0], self._weight[moved, 0] = pose[moved, :2], 1.0
+        place = moved, self._newest[moved]
+        self._position[place], self._weight[place] = pose[moved, :2], 1.0
+        self._valid[place] = False
         for own in (self._bearing, self._distance, self._count):
-            own[moved, 0] = 0.0
+            own[place] = 0.0
         heading = pose[rows, 2]
         turned = (np.arange(self.bins) - heading[:, None] * (self.bins // HEADINGS)) % self.bins
-        self._bearing[rows, 0, heading] += np.take_along_axis(bearing[rows], turned, 1)
-        self._distance[rows, 0, heading] += distance[rows]
-        self._count[rows, 0, heading] += 1
+        heard = rows, self._newest[rows], heading
+        self._bearing[heard] += np.take_along_axis(bearing[rows], turned, 1)
+        self._distance[heard] += distance[rows]
+        self._count[heard] += 1
 
     def score(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> None:
         """Compute the posterior on the graphs of now.
+
+        The fields of earlier places are computed anew only where a square has become a node, or is
+        none any more.
 
         Parameters
         ----------
@@ -97,40 +116,63 @@ class ArrivalBelief:
         active : (N,) bool
             Agents to update.
         """
-        model = self.model
-        row, slot = np.nonzero((self._weight > 1e-3) & active[:, None])
-        size = cost.shape[1]
-        shape = (len(row), size, size)
-        length, direction = np.empty(shape, np.int16), np.empty(shape, np.uint8)
+        blocked = np.isinf(cost)
+        self._valid[(blocked != self._blocked).any((1, 2))] = False
+        self._blocked = blocked
+        kept = (self._weight > _LEAST_WEIGHT) & active[:, None]
+        fields = np.nonzero(kept & ~self._valid)
         sound_fields(
-            cost, self._position[row, slot], row, model.reach, self.bins, length, direction
+            cost,
+            self._position,
+            *fields,
+            self.model.reach,
+            self.bins,
+            self._length,
+            self._direction,
         )
-        count = np.maximum(self._count[row, slot], 1)
-        heard = self._count[row, slot] > 0
-        share = model.blur / self.bins
-        mean = self._bearing[row, slot] / count[..., None]
-        likely = np.log((1 - model.blur) * np.exp(mean) + share) * heard[..., None]
-        bearing = np.zeros((len(row), self.bins + 1), np.float32)
-        weight = self._weight[row, slot][:, None]
-        bearing[:, :-1] = model.bearing_weight * weight * likely.sum(1)
-        bearing[:, -1] = bearing[:, :-1].min(1) - 5
-        mean_and_sigma = self._distance[row, slot] / count[..., None]
-        precision = heard / np.maximum(mean_and_sigma[..., 1], model.least_sigma) ** 2
-        log_length = (mean_and_sigma[..., 0] * precision).sum(1) / precision.sum(1)
-        precision = model.distance_weight * weight[:, 0] * precision.sum(1) / heard.sum(1)
-        begin = np.searchsorted(row, np.arange(len(cost) + 1))
+        self._valid[fields] = True
+        row, slot = np.nonzero(kept)
+        bearing = np.zeros((*kept.shape, self.bins + 1), dtype=np.float32)
+        log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))
+        bearing[row, slot] = self._bearing_terms(row, slot)
+        log_length[row, slot], precision[row, slot] = self._length_terms(row, slot)
+        position = self._position[np.arange(len(cost)), self._newest]
         _score(
             self.log_belief,
             cost,
             self.searched,
             active,
-            begin,
-            length,
-            direction,
-            bearing,
-            log_length.astype(np.float32),
-            precision.astype(np.float32),
+            kept,
+            position,
+            self.model.reach,
+            (self._length, self._direction),
+            (bearing, log_length, precision),
         )
+
+    def _bearing_terms(self, row: NDArray[np.int64], slot: NDArray[np.int64]) -> NDArray[Any]:
+        """Return the weighted log-probability of each direction, and of none, (R, B + 1)."""
+        count, model = self._count[row, slot], self.model
+        mean = self._bearing[row, slot] / np.maximum(count, 1)[..., None]
+        likely = np.log((1 - model.blur) * np.exp(mean) + model.blur / self.bins)
+        summed = (likely * (count > 0)[..., None]).sum(1)
+        terms = model.bearing_weight * self._weight[row, slot][:, None] * summed
+        # beyond the reach is less likely than the least likely direction
+        return np.concatenate((terms, terms.min(1, keepdims=True) - 5), 1)
+
+    def _length_terms(
+        self, row: NDArray[np.int64], slot: NDArray[np.int64]
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return mean and weighted precision of the log-length, over the headings, (R,) each."""
+        count, model = self._count[row, slot], self.model
+        mean, sigma = np.moveaxis(
+            self._distance[row, slot] / np.maximum(count, 1)[..., None], -1, 0
+        )
+        precision = (count > 0) / np.maximum(sigma, model.least_sigma) ** 2
+        total = precision.sum(1)
+        # the errors of the headings are not independent: their mean precision counts once
+        once = total / (count > 0).sum(1)
+        weight = model.distance_weight * self._weight[row, slot]
+        return (mean * precision).sum(1) / total, weight * once
 
     def rule_out(self, position: NDArray[np.int64], reach: int, rows: NDArray[np.bool_]) -> None:
         """Mark the squares around agents as searched. See `rule_out`."""
@@ -170,28 +212,32 @@ class ArrivalBelief:
         return found
 
 
-@numba.njit(cache=True, parallel=True, fastmath=False)
+@numba.njit(cache=True, parallel=True)
 def _score(  # type: ignore[no-untyped-def]
-    log_belief, cost, searched, active, begin, length, direction, bearing, log_length, precision
+    log_belief, cost, searched, active, kept, position, reach, fields, terms
 ):
-    size = cost.shape[1]
-    longest = 400
-    logs = np.empty(longest * 8, dtype=np.float32)
-    logs[0] = math.log(0.25 * CELL)
+    length, direction = fields
+    bearing, log_length, precision = terms
+    size, slots = cost.shape[1], kept.shape[1]
+    logs = np.empty(_LENGTHS, dtype=np.float32)
+    logs[0] = math.log(0.5 * CELL)  # of the square where the agent is
     for i in range(1, len(logs)):
         logs[i] = math.log(i * SQUARES * CELL)
     for n in numba.prange(len(cost)):
         if not active[n]:
             continue
-        for y in range(size):
-            for x in range(size):
-                total = np.float32(-np.inf)
-                if cost[n, y, x] < np.inf and not searched[n, y, x]:
-                    total = np.float32(0.0)
-                    for row in range(begin[n], begin[n + 1]):
-                        units = min(int(length[row, y, x]), longest * 8 - 1)
-                        off = logs[units] - log_length[row]
-                        # far outliers cost no more than a bound
-                        gauss = min(np.float32(0.5) * off * off * precision[row], np.float32(8.0))
-                        total += bearing[row, direction[row, y, x]] - gauss
+        log_belief[n, :, :] = -np.inf
+        x0, y0 = position[n, 0], position[n, 1]
+        for y in range(max(y0 - reach, 0), min(y0 + reach + 1, size)):
+            for x in range(max(x0 - reach, 0), min(x0 + reach + 1, size)):
+                if cost[n, y, x] == np.inf or searched[n, y, x]:
+                    continue
+                total = np.float32(0.0)
+                for k in range(slots):
+                    if kept[n, k]:
+                        units = min(int(length[n, k, y, x]), _LENGTHS - 1)
+                        off = logs[units] - log_length[n, k]
+                        least = np.float32(0.5) * off * off * precision[n, k]
+                        total += bearing[n, k, direction[n, k, y, x]]
+                        total -= min(least, np.float32(_OUTLIER))
                 log_belief[n, y, x] = total

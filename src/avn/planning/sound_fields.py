@@ -30,34 +30,36 @@ _LONGEST = 31
 def sound_fields(
     cost: NDArray[np.float32],
     position: NDArray[np.int64],
-    rows: NDArray[np.int64],
+    row: NDArray[np.int64],
+    slot: NDArray[np.int64],
     reach: int,
     bins: int,
     length: NDArray[np.int16],
     direction: NDArray[np.uint8],
 ) -> None:
-    """Compute the field of each agent, in place.
+    """Compute R fields, in place.
 
     Parameters
     ----------
     cost : (N, M, M) float32
         Cost of entering each square, 1 or more; infinite without a node. See `PartialGraph`.
-    position : (R, 2) int64
-        Column and row from which the sound of each field is heard.
-    rows : (R,) int64
-        Agent of each field.
+    position : (N, K, 2) int64
+        Column and row at which each of N agents has been K times.
+    row, slot : (R,) int64
+        Indices of the fields: agent, and place from which they are seen.
     reach : int
         Squares up to which paths are followed.
     bins : int
         Number of directions B, at most 255; bin b is centred at b/B turns clockwise from the front
         of the map.
-    length : (R, M, M) int16
+    length : (N, K, M, M) int16
         Set to the length of the path to each square, in units of `SQUARES`; `UNREACHED` beyond.
-    direction : (R, M, M) uint8
+    direction : (N, K, M, M) uint8
         Set to the bin of the direction in which it leaves; `bins` where the agent is, and beyond.
     """
-    for row in numba.prange(len(rows)):
-        _field(cost[rows[row]], position[row], reach, bins, length[row], direction[row])
+    for i in numba.prange(len(row)):
+        n, k = row[i], slot[i]
+        _field(cost[n], position[n, k], reach, bins, length[n, k], direction[n, k])
 
 
 @numba.njit(cache=True)
