@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 LOOKS = ("once", "around")
 # Observations and estimates that the ground truth can replace.
-ORACLE_INPUTS = ("source_estimate", "local_patch", "map", "pose")
+ORACLE_INPUTS = ("source_estimate", "arrival", "local_patch", "map", "pose")
 # Cost of a turn that does not count: low enough that it only decides between equal paths.
 _TIE = 0.01
 
@@ -69,7 +69,7 @@ class PlannerAgent(Agent):
         Stop.
     oracle_inputs : sequence of str
         Inputs that the ground truth replaces, which makes the agent privileged:
-        `source_estimate`, `local_patch`, `map` and `pose`. `map` and `pose` are set in the mapper,
+        `source_estimate`, `arrival`, `local_patch`, `map` and `pose`. The last two are set in the mapper,
         the others come with the observations.
 
     Raises

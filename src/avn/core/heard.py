@@ -2,13 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import torch
 from torch import Tensor
 
 # Numbers behind the bins of the bearing: mean and standard deviation of the logarithm of the length
 # of the path in metres, log-odds of being in sight, metres right and front, standard deviation.
 OTHERS = 6
+
+
+def bearing_label(arrival: Tensor, bins: int, spread: float) -> Tensor:
+    """Return the distribution of a direction over bins, spread around it.
+
+    Parameters
+    ----------
+    arrival : (N, 2) tensor
+        Unit vectors, right and front; 0 for none, which is spread evenly.
+    bins : int
+        Directions B, clockwise from the front.
+    spread : float
+        Standard deviation in radians, of a von Mises distribution.
+
+    Returns
+    -------
+    (N, B) tensor
+        Probabilities.
+    """
+    angle = torch.atan2(arrival[:, 0], arrival[:, 1])
+    centres = torch.arange(bins, device=arrival.device) * (2 * math.pi / bins)
+    label = (torch.cos(angle[:, None] - centres) / spread**2).softmax(1)
+    there = arrival.square().sum(1, keepdim=True) > 0
+    return torch.where(there, label, torch.full_like(label, 1 / bins))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -9,6 +11,7 @@ from torch import Tensor
 from avn.acoustics.direct_path import find_paths
 from avn.acoustics.settings import AcousticsConfig
 from avn.apartments.walls import walls
+from avn.core.heard import bearing_label
 from avn.dataset.scene import Scene
 from avn.dataset.source_locations import locate_sources, to_headings
 
@@ -46,3 +49,17 @@ def arrivals(scene: Scene, acoustics: AcousticsConfig) -> Tensor:
     direction, length = torch.from_numpy(np.stack(found)).float().split((2, 1), -1)
     turned = to_headings(direction[..., 0], direction[..., 1])
     return torch.cat((turned, length.repeat_interleave(4, 1), locate_sources(scene)[0]), -1)
+
+
+def true_arrivals(scene: Scene, acoustics: AcousticsConfig, bins: int = 72) -> Tensor:
+    """Return the ground truth in the form of what is heard, (K, S, bins + 6); see `Arrivals`.
+
+    Directions are spread by a bin, logarithms of lengths by 0.1 and locations by 0.1 m.
+    """
+    truth, (_, in_sight) = arrivals(scene, acoustics), locate_sources(scene)
+    direction, length, location = truth.split((2, 1, 2), -1)
+    label = bearing_label(direction.flatten(0, 1), bins, 2 * math.pi / bins)
+    bearing = label.clamp_min(1e-9).log().unflatten(0, direction.shape[:2])
+    small = torch.full_like(length, 0.1)
+    sight = torch.where(in_sight, 10.0, -10.0)[..., None]
+    return torch.cat((bearing, length, small, sight, location, small), -1)

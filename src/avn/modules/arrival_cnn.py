@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from torchmetrics import MeanMetric
 
 from avn.core.errors import UserError
-from avn.core.heard import OTHERS, Arrivals
+from avn.core.heard import OTHERS, Arrivals, bearing_label
 from avn.modules.arrival_metrics import ArrivalErrors
 from avn.modules.audio_network import FIVE_LAYERS, PictureBatch
 from avn.modules.network import SUBSETS, Part
@@ -133,7 +133,7 @@ class ArrivalCnn(SoundCnn):
         """
         arrival, log_length, location = target[:, :2], target[:, 2], target[:, 3:]
         raw, heard = Arrivals(outputs), Arrivals(self.answer(outputs))
-        label = self.label(arrival)
+        label = bearing_label(arrival, self.bins, self.spread)
         bearing = -(label * heard.bearing).sum(1)
         (mean, sigma) = heard.distance.unbind(1)
         length = 0.5 * ((log_length - mean) / sigma).square() + sigma.log()
@@ -144,15 +144,6 @@ class ArrivalCnn(SoundCnn):
         sigma = heard.location_sigma
         place = 0.5 * away / sigma.square() + 2 * sigma.log()
         return (bearing + length + sight + 0.5 * place).mean()
-
-    def label(self, arrival: Tensor) -> Tensor:
-        """Return the label of the direction of arrival (N, 2 or more), probabilities of bins (N, bins)."""
-        angle = torch.atan2(arrival[:, 0], arrival[:, 1])
-        centres = torch.arange(self.bins, device=arrival.device) * (2 * math.pi / self.bins)
-        close = torch.cos(angle[:, None] - centres) / self.spread**2
-        label = close.softmax(1)
-        there = arrival[:, :2].square().sum(1, keepdim=True) > 0
-        return torch.where(there, label, torch.full_like(label, 1 / self.bins))
 
     def name_sounds(self, sounds: Sequence[str]) -> None:
         """Set the names of the sounds, by index; metrics are grouped by them."""

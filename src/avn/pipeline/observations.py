@@ -13,6 +13,7 @@ from torch import Tensor
 
 from avn.core.errors import UserError
 from avn.core.settings import typed
+from avn.dataset.arrivals import true_arrivals
 from avn.dataset.scene import Scene
 from avn.dataset.source_locations import locate_sources
 from avn.navigation.observations import RenderedAudio, SceneObservations
@@ -22,6 +23,7 @@ from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.occupancy import LocalPatches, has_occupancy_model, true_local_patches
 from avn.pipeline.rendered_audio import Spectrograms, Waveforms
+from avn.pipeline.scenes import acoustics_of
 from avn.pipeline.sound_network import SourceEstimates, has_sound_model
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stop_classifier import StopProbabilities, has_stop_model
@@ -83,6 +85,14 @@ def _true_estimates(apartments: Apartments, scenes: Sequence[Scene]) -> list[Ten
     ]
 
 
+def _true_arrivals(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
+    sounds, acoustics = len(sound_files(apartments.cfg, apartments.world)), acoustics_of(apartments)
+    return [
+        true_arrivals(scene, acoustics)[:, :, None, None].expand(-1, -1, sounds, -1, -1)
+        for scene in scenes
+    ]
+
+
 def _true_patches(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
     camera = typed(apartments.cfg.renderer.camera)
     both = [true_local_patches(plan, camera) for plan in apartments.plans]
@@ -107,6 +117,8 @@ OBSERVATIONS = {
         stage=ArrivalEstimates,
         load=ArrivalEstimates.load,
         there=hears_arrivals,
+        truth="arrival",
+        true=_true_arrivals,
     ),
     "stop_probability": Observation(
         shape="(): probability that the source is within reach",
