@@ -81,7 +81,8 @@ class BeliefAgent(PlannerAgent):
             self._belief = ArrivalBelief(self.n, graph.cost.shape[1], heard.bins, self.model)
         belief = self._belief
         belief.hear(pose, heard.bearing.numpy(), heard.distance.numpy(), active)
-        belief.rule_out(pose[:, :2], self._near, active)
+        if not (self.protocol.requires_stop and self.stop_by == "belief"):
+            belief.rule_out(pose[:, :2], self._near, active)
         belief.score(graph.cost, active)
 
     def _targets(self, active: np.ndarray) -> np.ndarray:

@@ -69,8 +69,8 @@ class PlannerAgent(Agent):
         Stop.
     oracle_inputs : sequence of str
         Inputs that the ground truth replaces, which makes the agent privileged:
-        `source_estimate`, `arrival`, `local_patch`, `map` and `pose`. The last two are set in the mapper,
-        the others come with the observations.
+        `source_estimate`, `arrival`, `local_patch`, `map` and `pose`. The last two are set in the
+        mapper, the others come with the observations.
 
     Raises
     ------
