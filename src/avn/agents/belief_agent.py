@@ -37,8 +37,10 @@ class BeliefAgent(PlannerAgent):
         What the decision to stop rests on, for protocols with Stop: "belief" is the probability
         that the source is at the agent's square or beside it, "classifier" that of the stop
         classifier.
+    stop_above : float
+        Probability from which it stops by "belief", more than 0 and up to 1.
     stop_at : float
-        Probability from which the agent stops, 0 to 1.
+        Probability from which it stops by "classifier", 0 to 1.
     **planner
         Other parameters of `PlannerAgent`, without those of its source filter.
     """
@@ -48,13 +50,16 @@ class BeliefAgent(PlannerAgent):
         mapper: Mapper,
         model: ArrivalModel | None = None,
         stop_by: str = "belief",
+        stop_above: float = 0.5,
         stop_at: float = 0.5,
         **planner: Any,
     ) -> None:
         super().__init__(mapper, stop_at=stop_at, **planner)
         if stop_by not in STOPS:
             raise UserError(f"planner.stop_by: '{stop_by}' is none of {', '.join(STOPS)}")
-        self.model, self.stop_by = model or ArrivalModel(), stop_by
+        if not 0 < stop_above <= 1:
+            raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and up to 1")
+        self.model, self.stop_by, self.stop_above = model or ArrivalModel(), stop_by, stop_above
         self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
@@ -66,8 +71,8 @@ class BeliefAgent(PlannerAgent):
         """Return the settings of the source filter, and those of Stop that do not count."""
         classified = protocol.requires_stop and self.stop_by == "classifier"
         stop = () if protocol.requires_stop else ("stop_by",)
-        at = ("stop_at",) if classified or not protocol.requires_stop else ()
-        return ("source_filter", "error", *stop, *at)
+        above = ("stop_above",) if classified or not protocol.requires_stop else ()
+        return ("source_filter", "error", *stop, *above)
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
         """Begin N new episodes. See `Agent.reset`."""
@@ -94,4 +99,4 @@ class BeliefAgent(PlannerAgent):
             return super()._stops(observation)
         assert self._belief is not None
         position = self.mapper.pose[:, :2].numpy()
-        return torch.from_numpy(self._belief.near(position, _BESIDE) >= self.stop_at)
+        return torch.from_numpy(self._belief.near(position, _BESIDE) >= self.stop_above)
