@@ -30,13 +30,17 @@ from avn.reporting.model_card import CARD
 ACTOR_CRITICS = ("a3c_v", "a3c_va", "a3c_va_mapper", "a3c_va_m", "a3c_va_m_mapper")
 PLANNERS = ("ours_noexp", "plan_noexp")
 WORLDS = ("acoustics=diffraction", "acoustics=resonance")
+PROTOCOLS = ("protocol=var", "protocol=stop")
 # Settings of `avn.eval`; rows with exploration have the same networks.
 RUNS = [
-    *([f"agent={row}", world] for world in WORLDS for row in PLANNERS),
+    *(
+        [f"agent={row}", world, protocol]
+        for world in WORLDS
+        for protocol in PROTOCOLS
+        for row in PLANNERS
+    ),
     *([f"agent={row}", "acoustics=resonance"] for row in ACTOR_CRITICS),
 ]
-# Networks drawn by further values of `train_seed`.
-MORE = [["agent=plan_noexp", world, f"train_seed={seed}"] for world in WORLDS for seed in (1, 2)]
 
 
 def weights_of(path: Path) -> dict[str, Tensor]:
@@ -75,7 +79,7 @@ def publish(stage: Trained) -> dict[str, Any]:
 def main(outputs: str) -> None:
     """Publish the networks of all runs that are trained in a folder of outputs."""
     stages: dict[str, Trained] = {}
-    for run in [*RUNS, *MORE]:
+    for run in RUNS:
         cfg, _ = compose_command("eval", [*run, f"outputs={outputs}"])
         for stage in with_needs([Evaluation(cfg)]):
             if isinstance(stage, Trained):

@@ -10,7 +10,8 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from avn.config.folder import conf_folder
 
 FILES = sorted((conf_folder() / "experiment").glob("*.yaml"))
-DOCUMENTS = [Path(__file__).parents[2] / "docs" / name for name in ("reproduction.md", "table.md")]
+PAGES = ("reproduction.md", "earlier_results.md", "table.md")
+DOCUMENTS = [Path(__file__).parents[2] / "docs" / name for name in PAGES]
 COMMAND = re.compile(r"# python -m avn\.(\w+) experiment=(\w+)\n")
 
 
