@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from avn.agents.belief_agent import BeliefAgent
+from avn.agents.belief_agent import BeliefAgent, goal_offsets
 from avn.agents.rollout import Labels, rollout_scene
 from avn.apartments.local_patch import window_cells
 from avn.core.errors import UserError
@@ -120,3 +120,10 @@ def test_settings_without_effect_are_named():
         BeliefAgent(OccupancyMapper(), stop_by="luck")
     with pytest.raises(UserError, match=r"planner\.stop_above: 0"):
         BeliefAgent(OccupancyMapper(), stop_above=0)
+
+
+def test_the_goal_is_that_of_the_protocol():
+    beside = {(0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)}
+    assert set(map(tuple, goal_offsets(STOP).tolist())) == beside
+    assert len(goal_offsets(VAR)) == 9
+    assert len(goal_offsets(dataclasses.replace(STOP, radius=1.5))) == 13

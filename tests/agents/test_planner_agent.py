@@ -185,7 +185,8 @@ def test_settings_that_cannot_work_are_refused() -> None:
     with pytest.raises(UserError, match=r"look: 'twice' is none of once, around"):
         PlannerAgent(OccupancyMapper(), look="twice")
     with pytest.raises(
-        UserError, match=r"agent.oracle_inputs: 'goal' is none of source_estimate, arrival, local_patch"
+        UserError,
+        match=r"agent.oracle_inputs: 'goal' is none of source_estimate, arrival, local_patch",
     ):
         PlannerAgent(OccupancyMapper(), oracle_inputs=["goal"])
     with pytest.raises(UserError, match=r"planner.obstacle_threshold: 0.7; give 0 to 0.5"):

@@ -35,7 +35,8 @@ def test_the_heads_have_their_meaning():
     heard = Arrivals(model.arrival(torch.randn(3, 2, RATE)))
     assert heard.values.shape == (3, 72 + OTHERS)
     assert torch.allclose(heard.bearing.exp().sum(1), torch.ones(3), atol=1e-5)
-    assert (heard.distance[:, 1] > 0).all() and (heard.location_sigma > 0).all()
+    assert (heard.distance[:, 1] > 0).all()
+    assert (heard.location_sigma > 0).all()
     assert torch.equal(model(torch.zeros(2, 2, RATE)).isfinite(), torch.ones(2, 2).bool())
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from avn.agents.planner_agent import PlannerAgent
+from avn.apartments.floor_plan import CELL
 from avn.core.errors import UserError
 from avn.core.heard import Arrivals
 from avn.mapping.base import Mapper
@@ -20,8 +23,6 @@ if TYPE_CHECKING:
     from tensordict import TensorDict
 
 STOPS = ("belief", "classifier")
-# The squares nearer than 1 m: its own and the four beside it.
-_BESIDE = np.array([(0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)])
 
 
 class BeliefAgent(PlannerAgent):
@@ -35,8 +36,7 @@ class BeliefAgent(PlannerAgent):
         Weights of the evidence.
     stop_by : {"belief", "classifier"}
         What the decision to stop rests on, for protocols with Stop: "belief" is the probability
-        that the source is at the agent's square or beside it, "classifier" that of the stop
-        classifier.
+        that the agent is at the goal, by the posterior; "classifier" that of the stop classifier.
     stop_above : float
         Probability from which it stops by "belief", more than 0 and up to 1.
     stop_at : float
@@ -78,6 +78,7 @@ class BeliefAgent(PlannerAgent):
         """Begin N new episodes. See `Agent.reset`."""
         super().reset(n, generator, protocol)
         self._belief: ArrivalBelief | None = None
+        self._goal = goal_offsets(protocol)
 
     def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
         heard = Arrivals(observation["arrival"].float())
@@ -99,4 +100,17 @@ class BeliefAgent(PlannerAgent):
             return super()._stops(observation)
         assert self._belief is not None
         position = self.mapper.pose[:, :2].numpy()
-        return torch.from_numpy(self._belief.near(position, _BESIDE) >= self.stop_above)
+        return torch.from_numpy(self._belief.near(position, self._goal) >= self.stop_above)
+
+
+def goal_offsets(protocol: Protocol) -> NDArray[np.int64]:
+    """Return the offsets from a goal square to the source, columns and rows, (k, 2) int64.
+
+    They are those of a protocol's goal without walls: the 3 x 3 squares, or those that fewer moves
+    than the radius lead to.
+    """
+    most = 1 if protocol.goal == "box" else math.ceil(protocol.radius / CELL)
+    offsets = np.stack(np.meshgrid(*[np.arange(-most, most + 1)] * 2), -1).reshape(-1, 2)
+    if protocol.goal == "box":
+        return offsets
+    return offsets[CELL * np.abs(offsets).sum(1) < protocol.radius]

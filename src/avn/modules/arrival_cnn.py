@@ -60,8 +60,8 @@ class ArrivalCnn(SoundCnn):
             raise UserError(f"sound_model.spread: {spread}; give more than 0 and up to 90 degrees")
         self.bins, self.spread = bins, math.radians(spread)
         super().__init__(net=net, **recipe)
-        self.training_loss = MeanMetric()  # type: ignore[assignment]
-        self.losses = [MeanMetric() for _ in SUBSETS]  # type: ignore[misc]
+        self.training_loss = MeanMetric()
+        self.losses = [MeanMetric() for _ in SUBSETS]
         self.arrivals: list[ArrivalErrors] = []
 
     @property
@@ -161,7 +161,8 @@ class ArrivalCnn(SoundCnn):
         """Add one batch to the metrics of a subset. See `SoundCnn.validation_step`."""
         outputs = self.estimate(batch["pictures"]).cpu()
         target, in_sight = batch["target"].cpu(), batch["in_sight"].cpu()
-        self.losses[dataloader_idx].update(self.loss(outputs, target, in_sight), len(target))
+        loss = self.loss(outputs, target, in_sight)
+        self.losses[dataloader_idx].update(loss, len(target))
         heard = Arrivals(self.answer(outputs))
         self.errors[dataloader_idx].update(
             heard.location, target[:, 3:], in_sight, batch["sound"].cpu()

@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 from torch import Tensor, nn
-from torchmetrics import MeanSquaredError
+from torchmetrics import MeanSquaredError, Metric
 
 from avn.core.errors import UserError
 from avn.modules.audio_network import AudioNetwork, PictureBatch
@@ -33,9 +33,9 @@ class SoundCnn(AudioNetwork):
 
     def __init__(self, **recipe: Any) -> None:
         super().__init__(**recipe)
-        self.training_loss = MeanSquaredError()
+        self.training_loss: Metric = MeanSquaredError()
         # In plain lists metrics stay on the CPU and out of checkpoints.
-        self.losses = [MeanSquaredError() for _ in SUBSETS]
+        self.losses: list[Metric] = [MeanSquaredError() for _ in SUBSETS]
         self.errors: list[LocationErrors] = []
 
     def forward(self, clips: Tensor) -> Tensor:

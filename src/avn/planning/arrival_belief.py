@@ -120,17 +120,18 @@ class ArrivalBelief:
         self._valid[(blocked != self._blocked).any((1, 2))] = False
         self._blocked = blocked
         kept = (self._weight > _LEAST_WEIGHT) & active[:, None]
-        fields = np.nonzero(kept & ~self._valid)
+        stale_row, stale_slot = np.nonzero(kept & ~self._valid)
         sound_fields(
             cost,
             self._position,
-            *fields,
+            stale_row,
+            stale_slot,
             self.model.reach,
             self.bins,
             self._length,
             self._direction,
         )
-        self._valid[fields] = True
+        self._valid[stale_row, stale_slot] = True
         row, slot = np.nonzero(kept)
         bearing = np.zeros((*kept.shape, self.bins + 1), dtype=np.float32)
         log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))

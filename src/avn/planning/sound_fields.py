@@ -122,7 +122,7 @@ def _field(cost, position, reach, bins, length, direction):  # type: ignore[no-u
 @numba.njit(cache=True)
 def _bin(right, front, bins):  # type: ignore[no-untyped-def]
     turns = math.atan2(right, front) / (2 * math.pi)
-    return int(round(turns * bins)) % bins
+    return round(turns * bins) % bins
 
 
 @numba.njit(cache=True)
