@@ -39,6 +39,27 @@ def test_it_sees_hears_maps_and_walks(command, outputs, protocol):
         assert set(episodes["outcome"]) <= {"success", "stopped_elsewhere", "out_of_actions"}
 
 
+@pytest.mark.parametrize("more", [("protocol=stop", "look=around"), ("protocol=var",)])
+def test_it_follows_how_the_sound_arrives(command, outputs, more):
+    world = ("acoustics=diffraction", *more)
+    code, out, err = ours(command, outputs, "agent=belief", *world)
+    assert code == 0, err
+    folder, episodes = Path(out[-1]), records(out)
+    assert set(episodes["agent"]) == {"belief"}
+    assert ours(command, outputs, "agent=belief", *world)[1][-1] == out[-1]
+    assert not (folder / "source_estimates.csv").exists()
+
+
+def test_exact_arrivals_are_an_oracle_input(command, outputs):
+    exact = ("agent.oracle_inputs=[arrival]", "agent.privileged=true")
+    code, out, err = ours(command, outputs, "agent=belief", "acoustics=diffraction", *exact)
+    assert code == 0, err
+    assert set(records(out)["agent"]) == {"belief-true-arrival"}
+    code, _, err = ours(command, outputs, "agent=plan_noexp", *exact)
+    assert code == 2
+    assert "arrival" in err[-1]
+
+
 @pytest.mark.parametrize("row", ["ours_noexp", "ours_exp"])
 def test_the_rows_of_the_paper_walk_and_say_stop(command, outputs, row):
     code, out, err = ours(command, outputs, f"agent={row}", "protocol=var_stop")
@@ -119,6 +140,10 @@ def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (("agent=belief", "sound_model=cnn5"), "choose a sound model with heads"),
+        (("agent=belief", "planner.source_filter=bayes"), "planner.source_filter"),
+        (("agent=belief", "planner.stop_above=0.3"), "planner.stop_above"),
+        (("agent=belief", "planner.model.kept=2"), "planner.model.kept: 2"),
         (("agent=plan_noexp", "mapper=none"), "mapper: 'none' remembers nothing to plan on"),
         (("agent=plan_noexp", "look=twice"), "look: 'twice' is none of once, around"),
         (("agent=plan_noexp", "subset=all"), "subset: 'all' is none of train, validation, test"),

@@ -28,7 +28,7 @@ def open_run(folder):
 
 
 def made(command, outputs, agent, *more):
-    eyes = EYES if agent == "plan_noexp" or agent.endswith("mapper") else ()
+    eyes = EYES if agent in ("plan_noexp", "belief") or agent.endswith("mapper") else ()
     eyes += A3C if agent.startswith("a3c") else ()
     settings = fitting(f"agent={agent}", *SMALL, *eyes)
     code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}", *more)
@@ -37,7 +37,7 @@ def made(command, outputs, agent, *more):
 
 
 @pytest.mark.parametrize(
-    "agent", ["random_walk", "greedy", "a3c_va_m_mapper", "plan_noexp", "plan_exp"]
+    "agent", ["random_walk", "greedy", "a3c_va_m_mapper", "plan_noexp", "plan_exp", "belief"]
 )
 def test_a_run_is_replayed_from_its_config(command, outputs, agent):
     folder = made(command, outputs, agent)
@@ -55,7 +55,7 @@ def test_a_run_is_replayed_from_its_config(command, outputs, agent):
     assert (traces[0].source_estimates is None) == (
         agent not in ("greedy", "plan_noexp", "plan_exp")
     )
-    assert (traces[0].beliefs is None) == (not agent.startswith("plan"))
+    assert (traces[0].beliefs is None) == (not agent.startswith(("plan", "belief")))
     assert (traces[0].exploration_trajectory is None) == (
         agent not in ("plan_exp", "a3c_va_m_mapper")
     )
