@@ -281,7 +281,7 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
             known.append("for a folder of floor plans give split.folder=PATH split.name=NAME")
         if unknown := _UNKNOWN_SOUND.search(first):
             known.append(f"there are {', '.join(option_names('sound'))}, {choices(unknown[1])}")
-            first = first.split(" Available options")[0]
+            first, causes = f"sound: there is no '{unknown[1]}'", []
         return "; ".join([first, *(cause for cause in causes[:1] if cause not in first), *known])
     return None
 
