@@ -26,8 +26,7 @@ from sound_credits import write_documents, write_licences
 from sound_families import SYNTHESISED, Family
 from sound_layout import events, levelled, loop, repeated
 from sound_packages import RATE, Samples, credits_of_sonic_pi, read
-from sound_recorded import RECORDED
-from sound_sources import PACKAGES, Source
+from sound_sources import PACKAGES, RECORDED, Source
 
 TARGET = Path(__file__).parents[1] / "src" / "avn" / "assets" / "dry_sounds"
 # Categories that are held out from training as a whole; all others are of training.
@@ -52,13 +51,39 @@ SYNTHESIS = {
 }
 # The recordings of `extract_dry_sounds.py`
 BENCHMARK = [
-    ("ring", "telephone", "ring tone", "lomiri-sounds", "22.02-1", "ringtones/Call me.ogg",
-     "anonymous", "CC0-1.0", "https://gitlab.com/ubports/core/lomiri-sounds"),
-    ("alarm", "alarm", "digital alarm clock", "ovos-skill-alerts", "0.1.28",
-     "res/snd/default-alarm.wav", "OpenVoiceOS and Neongecko.com Inc.", "BSD-3-Clause",
-     "https://pypi.org/project/ovos-skill-alerts"),
-    ("clock", "clock", "ticking clock", "sonic-pi-samples", "3.2.2", "elec_tick.flac",
-     "looppool", "CC0-1.0", "https://freesound.org/people/looppool/sounds/13113/"),
+    (
+        "ring",
+        "telephone",
+        "ring tone",
+        "lomiri-sounds",
+        "22.02-1",
+        "ringtones/Call me.ogg",
+        "anonymous",
+        "CC0-1.0",
+        "https://gitlab.com/ubports/core/lomiri-sounds",
+    ),
+    (
+        "alarm",
+        "alarm",
+        "digital alarm clock",
+        "ovos-skill-alerts",
+        "0.1.28",
+        "res/snd/default-alarm.wav",
+        "OpenVoiceOS and Neongecko.com Inc.",
+        "BSD-3-Clause",
+        "https://pypi.org/project/ovos-skill-alerts",
+    ),
+    (
+        "clock",
+        "clock",
+        "ticking clock",
+        "sonic-pi-samples",
+        "3.2.2",
+        "elec_tick.flac",
+        "looppool",
+        "CC0-1.0",
+        "https://freesound.org/people/looppool/sounds/13113/",
+    ),
 ]
 
 
@@ -80,7 +105,7 @@ def credit(sound: Source, packages: Path) -> dict[str, str]:
     """Return the columns of a recording that tell its origin."""
     package = PACKAGES[sound.package]
     author, url = sound.author or package.author, sound.url or package.url
-    if sound.package == "sonic-pi-samples" :
+    if sound.package == "sonic-pi-samples":
         author, url = credits_of_sonic_pi(packages, sound.files[0])
     file = " + ".join(file.replace("public.zip:", "") for file in sound.files)
     return {
@@ -146,9 +171,7 @@ def main() -> None:
     for sound in sounds:
         if wanted and sound.name not in wanted:
             continue
-        samples = (
-            synthesise(sound) if isinstance(sound, Family) else lay_out(sound, packages)
-        )
+        samples = synthesise(sound) if isinstance(sound, Family) else lay_out(sound, packages)
         path_of(sound.name).parent.mkdir(parents=True, exist_ok=True)
         soundfile.write(path_of(sound.name), samples, RATE, subtype="PCM_16")
     order = ("train", "validation", "test")

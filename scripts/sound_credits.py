@@ -144,7 +144,9 @@ def write_licences(folder: Path, packages: Path) -> None:
     mit = fluid[fluid.index("Upstream Author") :]
     (folder / FILES["MIT"]).write_text(tidy(mit.splitlines()), encoding="utf-8")
     flite = copyright_of(packages, "libflite1")
-    cmu = flite[flite.index("Authors:\tLanguage Technologies") : flite.index("This Debian package is")]
+    cmu = flite[
+        flite.index("Authors:\tLanguage Technologies") : flite.index("This Debian package is")
+    ]
     (folder / FILES["CMU-Flite"]).write_text(tidy(cmu.splitlines()), encoding="utf-8")
 
 

@@ -143,7 +143,9 @@ def credits_of_sonic_pi(folder: Path, name: str) -> tuple[str, str]:
     """
     package = folder / "sonic-pi-samples"
     text = find(package, "copyright").read_text()
-    pattern = rf"^Files: etc/samples/{re.escape(name)}\nCopyright: (.*)\nSource: (.*)\nLicense: CC0$"
+    pattern = (
+        rf"^Files: etc/samples/{re.escape(name)}\nCopyright: (.*)\nSource: (.*)\nLicense: CC0$"
+    )
     if found := re.search(pattern, text, re.MULTILINE):
         return re.sub(r"^\d{4} ", "", found[1]), found[2]
     readme = find(package, "samples/README.md").read_text()

@@ -1,6 +1,11 @@
-"""Sources of the recordings: packages, licences, and the part of a file that becomes a sound."""
+"""Sources of the recordings: packages, licences, and the part of a file that becomes a sound.
 
+`sound_recorded.csv` lists the sounds that are taken from packages, with their frozen splits.
+"""
+
+import csv
 from dataclasses import dataclass
+from pathlib import Path
 
 CC_BY_SA_3 = "CC-BY-SA-3.0"
 
@@ -32,9 +37,7 @@ PACKAGES = {
     "asterisk-moh-opsound-g722": Package(
         "2.03-1.1", CC_BY_SA_3, "", "https://downloads.asterisk.org/pub/telephony/sounds/"
     ),
-    "flite": Package(
-        "2.2-5", "CMU-Flite", "Carnegie Mellon University", "http://cmuflite.org"
-    ),
+    "flite": Package("2.2-5", "CMU-Flite", "Carnegie Mellon University", "http://cmuflite.org"),
     "fluid-soundfont-gm": Package(
         "3.1-5.3", "MIT", "Frank Wen", "https://packages.debian.org/fluid-soundfont-gm"
     ),
@@ -91,10 +94,6 @@ PACKAGES = {
     ),
 }
 
-GM = "FluidR3_GM.sf2:"
-GS = "FluidR3_GS.sf2:"
-AD = "public.zip:audio/"
-
 
 @dataclass(frozen=True)
 class Source:
@@ -133,15 +132,18 @@ class Source:
     url: str = ""
 
 
-def steps(surface: str, *numbers: int) -> tuple[str, ...]:
-    """Return the files of footsteps on a surface in `minetest-data`."""
-    return tuple(f"default_{surface}_footstep.{number}.ogg" for number in numbers)
+def read_recorded() -> list[Source]:
+    """Read the list of the recordings."""
+    path = Path(__file__).with_name("sound_recorded.csv")
+    with path.open(encoding="utf-8", newline="") as file:
+        return [source_of(row) for row in csv.DictReader(file)]
 
 
-def ringtone(name: str) -> tuple[str, ...]:
-    """Return the file of a ring tone in `lomiri-sounds`."""
-    return (f"ringtones/{name}.ogg",)
+def source_of(row: dict[str, str]) -> Source:
+    """Return the source of a row of the list."""
+    numbers = {key: float(row.pop(key)) for key in ("start", "seconds")}
+    files, gap = tuple(row.pop("files").split(";")), row.pop("gap")
+    return Source(files=files, gap=float(gap) if gap else None, **row, **numbers)
 
 
-DUARTE = {"author": "Mauricio Duarte", "licence": "CC-BY-4.0"}
-FREESOUND = "https://freesound.org/people/"
+RECORDED = read_recorded()

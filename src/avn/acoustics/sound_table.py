@@ -37,9 +37,9 @@ class PackagedSound:
 @cache
 def packaged_sounds() -> dict[str, PackagedSound]:
     """Read the recordings of the package by name, in the order of the table."""
-    with (sounds_folder() / "sounds.csv").open(encoding="utf-8", newline="") as file:
-        fields = PackagedSound.__dataclass_fields__
-        rows = [{key: row[key] for key in fields} for row in csv.DictReader(file)]
+    lines = (sounds_folder() / "sounds.csv").read_text(encoding="utf-8").splitlines()
+    fields = PackagedSound.__dataclass_fields__
+    rows = [{key: row[key] for key in fields} for row in csv.DictReader(lines)]
     return {row["name"]: PackagedSound(**row) for row in rows}
 
 

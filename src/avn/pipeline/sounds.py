@@ -20,7 +20,7 @@ LONGEST_FOLDER = 200  # bytes; file systems have names of up to 255
 
 
 def sound_files(cfg: DictConfig, world: WorldKeys = TEST) -> dict[str, str]:
-    """Return the sounds of a world: name to built-in recording or path.
+    """Return the sounds of a world: name to recording of the package or path.
 
     Raises
     ------
