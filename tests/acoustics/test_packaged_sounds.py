@@ -4,6 +4,7 @@ import csv
 import hashlib
 from collections import defaultdict
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -179,3 +180,14 @@ def test_a_packaged_sound_is_read_by_its_name():
     wave = read_sound("dog_pair")
     assert len(wave) >= RATE > fade_samples(RATE)
     assert np.sqrt(np.mean(wave.astype(float) ** 2)) == pytest.approx(1, abs=1e-4)
+
+
+def test_the_page_counts_the_recordings(rows):
+    page = (Path(__file__).parents[2] / "docs" / "sounds.md").read_text(encoding="utf-8")
+    assert f"{len(rows)} recordings in {len(CATEGORIES)} categories" in page
+    for category in CATEGORIES:
+        own = [row for row in rows if row["category"] == category]
+        counts = [sum(row["split"] == split for row in own) for split in SPLITS]
+        counts += [sum(row["kind"] == kind for row in own) for kind in ("recorded", "synthesised")]
+        line = [category, own[0]["category_split"], *map(str, counts)]
+        assert f"| {' | '.join(line)} |" in page
