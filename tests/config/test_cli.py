@@ -40,6 +40,8 @@ def test_a_key_that_no_schema_declares_is_refused_even_behind_a_plus():
         (["acoustics.rays=many"], "rays"),
         (["episodes=all"], "episodes: 'all' is none of frozen, exhaustive"),
         (["sound=missing.wav"], "missing.wav"),
+        (["sound=telefone"], "there is no 'telefone'; there are alarm, alarms, all, all_test"),
+        (["sound=[ring,dog_3]"], "name of a recording (dog_large, dog_single"),
         (["protocol.goal=disc"], "protocol.goal"),
         (["baseline=none"], "baseline: 'none' cannot act"),
         (["sound="], "sound"),

@@ -7,7 +7,6 @@ import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib import resources
 from math import gcd
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from avn.acoustics.audio_decoder import DecodingError, Recording, decode
 from avn.acoustics.sound_names import BUILTIN
+from avn.acoustics.sound_table import packaged_file, packaged_sounds
 from avn.core.errors import UserError
 from avn.core.progress import log
 
@@ -37,8 +37,8 @@ def read_sound(path: str | bytes | Path, rate: int = RATE) -> NDArray[np.float32
     ----------
     path : str, bytes or Path
         A file of a format of docs/sounds.md (WAV, FLAC, OGG, MP3, M4A, AIFF, ...), of any sampling
-        rate and any number of channels, or one of ``BUILTIN``. ``~`` is the home directory. The
-        name of a built-in sound has precedence over a file of the same name.
+        rate and any number of channels, or the name of a packaged sound (`packaged_sounds`). ``~``
+        is the home directory. A packaged sound has precedence over a file of the same name.
     rate : int
         Sampling rate of the result in Hz.
 
@@ -76,7 +76,7 @@ def load_sounds(mapping: Mapping[str, str], rate: int = RATE) -> dict[str, NDArr
     Parameters
     ----------
     mapping : mapping
-        Name of the sound to the name of a built-in sound or the path of a file.
+        Name of the sound to the name of a packaged sound or the path of a file.
     rate : int
         Sampling rate of the result in Hz.
 
@@ -92,7 +92,7 @@ def load_sounds(mapping: Mapping[str, str], rate: int = RATE) -> dict[str, NDArr
     """
     _require_sounds(mapping)
     for name, path in mapping.items():
-        if name in BUILTIN and path != name:
+        if name in packaged_sounds() and path != name:
             _tell_once(f"sound '{name}': {_readable(str(path))}, in place of the built-in {name}")
     return {name: read_sound(path, rate) for name, path in mapping.items()}
 
@@ -129,7 +129,7 @@ def _require_sounds(mapping: Mapping[str, str]) -> None:
 
 
 def _choices() -> str:
-    return f"{', '.join(BUILTIN)} or the path of an audio file"
+    return f"{', '.join(BUILTIN)}, another name of docs/sounds.md or the path of an audio file"
 
 
 def _error(path: str, wrong: str, remedy: str) -> UserError:
@@ -148,15 +148,15 @@ def _tell_once(line: str) -> None:
 
 
 def recording_bytes(path: str) -> bytes:
-    """Read the bytes of a built-in sound or of a file.
+    """Read the bytes of a packaged sound or of a file.
 
     Raises
     ------
     UserError
         If the file is missing, a folder, empty or cannot be read.
     """
-    if path in BUILTIN:
-        return (resources.files("avn") / "assets" / "dry_sounds" / f"{path}.flac").read_bytes()
+    if path in packaged_sounds():
+        return packaged_file(path).read_bytes()
     try:
         file = Path(path).expanduser()
         if file.exists() and not (file.is_file() or file.is_dir()):

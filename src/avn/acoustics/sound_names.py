@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import PurePath
 
+from avn.acoustics.sound_table import packaged_sounds
 from avn.core.errors import UserError
 
-BUILTIN = ("ring", "alarm", "clock")
-# Names that no file takes by itself: built-in sounds, and the row of all sounds.
-RESERVED = (*BUILTIN, "all")
+BUILTIN = ("ring", "alarm", "clock")  # the benchmark's recordings
+ALL = "all"  # the row of all sounds
 
 # Names of a file, in order of preference.
 _CANDIDATES: tuple[Callable[[PurePath], str], ...] = (
@@ -24,27 +24,27 @@ _CANDIDATES: tuple[Callable[[PurePath], str], ...] = (
 def name_sounds(mapping: Mapping[str, str]) -> dict[str, str]:
     """Name the sounds whose key is their own path; other sounds keep their names.
 
-    A file is named by its stem. Where the name is that of a built-in sound or of another sound of
+    A file is named by its stem. Where the name is that of a packaged sound or of another sound of
     the mapping, it is preceded by the folder (``a-phone``), or the suffix is kept (``ring.wav``).
 
     Parameters
     ----------
     mapping : mapping
-        Name of the sound, or the path of its file, to the name of a built-in sound or that path.
+        Name of the sound, or the path of its file, to the name of a packaged sound or that path.
 
     Returns
     -------
     dict
-        Distinct names to the names of built-in sounds or the paths, in the order of the mapping.
+        Distinct names to the names of packaged sounds or the paths, in the order of the mapping.
 
     Raises
     ------
     UserError
         If two files cannot be told apart by their names and folders.
     """
-    given = [key for key, path in mapping.items() if key != path or path in BUILTIN]
+    given = [key for key, path in mapping.items() if key != path or path in packaged_sounds()]
     files = [path for key, path in mapping.items() if key not in given]
-    names = _distinct(files, {*given, *RESERVED})
+    names = _distinct(files, {*given, *packaged_sounds(), ALL})
     found = iter(names)
     return {key if key in given else next(found): path for key, path in mapping.items()}
 

@@ -1,4 +1,7 @@
-"""Hydra plugin that accepts paths of audio files as options of the config group `sound`."""
+"""Hydra plugin that accepts recordings as options of the config group `sound`.
+
+A recording is the path of an audio file or the name of a recording of the package.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import DictConfig, OmegaConf
 
 from avn.acoustics.sound_names import name_sounds
+from avn.acoustics.sound_table import packaged_sounds
 
 AUDIO_SUFFIXES = (
     *(".wav", ".wave", ".rf64", ".bw64", ".w64", ".aif", ".aiff", ".aifc", ".au", ".snd", ".caf"),
@@ -49,11 +53,26 @@ def name_files(cfg: DictConfig) -> None:
             holder[key] = name_sounds(given)
 
 
-class AudioFiles(ConfigSource):
-    """Config source in which `sound/PATH.wav` holds the mapping {PATH.wav: PATH.wav}.
+def choices(option: str) -> str:
+    """Return the options of the group `sound` that have no file, for a message.
 
-    Paths are distinct, so that no file of a list takes the place of another or of a built-in sound;
-    `name_files` replaces them by names.
+    Parameters
+    ----------
+    option : str
+        An unknown option; of the names of recordings, those that begin as it does are listed.
+    """
+    prefix = f"{option.partition('_')[0]}_"
+    names = [name for name in packaged_sounds() if name.startswith(prefix)]
+    listed = f" ({', '.join(names)})" if names else ""
+    return f"or the name of a recording{listed}, see docs/sounds.md, or the path of an audio file"
+
+
+class AudioFiles(ConfigSource):
+    """Config source of recordings.
+
+    `sound/PATH.wav` holds the mapping {PATH.wav: PATH.wav}, and `sound/NAME` of a recording of the
+    package {NAME: NAME}. Paths are distinct, so that no file of a list takes the place of another
+    or of a packaged sound; `name_files` replaces them by names.
     """
 
     @staticmethod
@@ -62,7 +81,7 @@ class AudioFiles(ConfigSource):
         return "audio"
 
     def load_config(self, config_path: str) -> ConfigResult:
-        """Return the mapping from the file's path to itself."""
+        """Return the mapping from the recording's path or name to itself."""
         if not self.is_config(config_path):
             raise ConfigLoadError(f"Config not found: {config_path}")
         path = config_path.removeprefix(_GROUP)
@@ -79,15 +98,16 @@ class AudioFiles(ConfigSource):
         return False
 
     def is_config(self, config_path: str) -> bool:
-        """Return whether the path is an audio file's in the group `sound`."""
-        return config_path.startswith(_GROUP) and is_audio(config_path)
+        """Return whether the path is that of a recording in the group `sound`."""
+        option = config_path.removeprefix(_GROUP)
+        return option != config_path and (is_audio(option) or option in packaged_sounds())
 
     def available(self) -> bool:
         """Return True: the source needs no folder."""
         return True
 
     def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
-        """Return no names: audio files are not listed."""
+        """Return no names: recordings are not listed."""
         return []
 
 

@@ -24,7 +24,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from avn.config import renamed, spare
-from avn.config.audio_source import name_files, quoted
+from avn.config.audio_source import choices, name_files, quoted
 from avn.config.folder import conf_folder, without_folders
 from avn.config.help import help_text, is_asked
 from avn.config.option_files import option_names
@@ -46,6 +46,7 @@ _FLAGS = re.compile(
     r"-[cprih]+|--(cfg|package|resolve|run|info|hydra-help|version|shell-completion|config-path"
     r"|config-name|experimental-rerun)(=.*)?|-c[pn]"
 )
+_UNKNOWN_SOUND = re.compile(r"Could not (?:find|load) 'sound/(.*?)'")
 # Groups of which several options can be chosen at once.
 SEVERAL = ("logger", "callbacks")
 LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments", *SEVERAL)
@@ -280,6 +281,9 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
         known = [_known(link) for link in chain if _known(link)][:1]
         if "Could not find 'split/" in first:
             known.append("for a folder of floor plans give split.folder=PATH split.name=NAME")
+        if unknown := _UNKNOWN_SOUND.search(first):
+            known.append(f"there are {', '.join(option_names('sound'))}, {choices(unknown[1])}")
+            first, causes = f"sound: there is no '{unknown[1]}'", []
         return "; ".join([first, *(cause for cause in causes[:1] if cause not in first), *known])
     return None
 

@@ -154,7 +154,7 @@ class CoreConfig:
     Attributes
     ----------
     sound : dict of str to str
-        Recording of each sound by its name: a built-in recording or the path of an audio file.
+        Recording of each sound by its name: one of the package or the path of an audio file.
     logger, callbacks : dict
         Loggers and further callbacks of trainings by name, each with `_target_` and arguments of
         that class.

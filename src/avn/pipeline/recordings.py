@@ -7,7 +7,8 @@ from pathlib import Path
 import pandas as pd
 from omegaconf import DictConfig
 
-from avn.acoustics.dry_sounds import BUILTIN, content_hash, recording_bytes
+from avn.acoustics.dry_sounds import content_hash, recording_bytes
+from avn.acoustics.sound_table import packaged_sounds
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
 from avn.core.progress import log
@@ -32,7 +33,7 @@ def keep_recordings(cfg: DictConfig, folder: Path) -> None:
     hashes = content_hash(files)
     for name, path in files.items():
         kept = _kept(cfg, hashes[name])
-        if path not in BUILTIN and not kept.is_file():
+        if path not in packaged_sounds() and not kept.is_file():
             with atomic_write(kept) as part:
                 part.write_bytes(recording_bytes(path))
     rows = [(name, path, hashes[name]) for name, path in files.items()]
@@ -79,7 +80,7 @@ def _read(folder: Path) -> dict[str, tuple[str, str]]:
 def _found(cfg: DictConfig, folder: Path, path: str, known: str) -> str:
     """Return the path of a recording of known content: the kept one, or that of the run."""
     is_same = _hash(path) == known
-    if path in BUILTIN and is_same:
+    if path in packaged_sounds() and is_same:
         return path
     kept = _kept(cfg, known)
     if kept.is_file() and _hash(str(kept)) == known:

@@ -36,7 +36,7 @@ from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import learns
 from avn.pipeline.recordings import keep_recordings
 from avn.pipeline.scenes import Geometry
-from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
+from avn.pipeline.sounds import dry_sounds, folder_of_sounds, sound_files, sounds_content
 from avn.pipeline.stage import Stage
 from avn.reporting import results
 from avn.reporting.finished_run import EPISODE_RECORDS, RESULTS
@@ -127,7 +127,7 @@ class Evaluation(Stage):
     @property
     def folder(self) -> Path:
         """`outputs/eval/<agent>/<sounds>/seed<seed>-<hash8>`."""
-        sounds = "-".join(sound_files(self.cfg))
+        sounds = folder_of_sounds(sound_files(self.cfg))
         check_name("agent.name", self.cfg.agent.name)
         name = f"seed{self.cfg.seed}-{self.fingerprint[:8]}"
         return Path(self.cfg.outputs) / "eval" / self.cfg.agent.name / sounds / name
