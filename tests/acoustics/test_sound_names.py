@@ -2,7 +2,8 @@
 
 import pytest
 
-from avn.acoustics.sound_names import name_sounds
+from avn.acoustics.sound_names import joined_names, name_sounds
+from avn.acoustics.sound_table import select
 from avn.core.errors import UserError
 
 
@@ -39,3 +40,10 @@ def test_files_that_cannot_be_told_apart_are_refused(paths):
     with pytest.raises(UserError, match=r"sound: .* and .* cannot be told apart") as caught:
         names(*paths)
     assert all(path in str(caught.value) for path in paths)
+
+
+def test_joined_names_of_many_sounds_are_their_number():
+    assert joined_names(["ring", "alarm", "clock"], "-") == "ring-alarm-clock"
+    names = select(split=["test"])
+    assert joined_names(names) == f"{len(names)}-sounds"
+    assert len(joined_names(["é" * 60] * 2).encode()) < 200

@@ -29,8 +29,8 @@ def heard(cost, pose, source, sigma=0.1):
     bearing = np.full((1, BINS), math.log(0.01 / BINS), np.float32)
     local = (int(direction[there]) - pose[2] * BINS // 4) % BINS
     bearing[0, local] = math.log(0.99)
-    metres = 0.5 * length[there] * SQUARES
-    return bearing, np.array([[math.log(metres), sigma]], np.float32)
+    squares = length[there] * SQUARES
+    return bearing, np.array([[math.log(squares), sigma]], np.float32)
 
 
 def walk(cost, poses, source, model=None, **more):

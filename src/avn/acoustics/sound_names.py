@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import PurePath
 
 from avn.acoustics.sound_table import packaged_sounds
@@ -11,6 +11,8 @@ from avn.core.errors import UserError
 
 BUILTIN = ("ring", "alarm", "clock")  # the benchmark's recordings
 ALL = "all"  # the row of all sounds
+# Length of joined names in bytes, of which file names hold 255 with what surrounds them.
+_LONGEST = 150
 
 # Names of a file, in order of preference.
 _CANDIDATES: tuple[Callable[[PurePath], str], ...] = (
@@ -19,6 +21,12 @@ _CANDIDATES: tuple[Callable[[PurePath], str], ...] = (
     lambda path: path.name,
     lambda path: _with_folder(path, path.name),
 )
+
+
+def joined_names(names: Collection[str], by: str = "+") -> str:
+    """Return the names of some sounds joined, or of many their number, such as `74-sounds`."""
+    joined = by.join(names)
+    return joined if len(joined.encode()) <= _LONGEST else f"{len(names)}-sounds"
 
 
 def name_sounds(mapping: Mapping[str, str]) -> dict[str, str]:

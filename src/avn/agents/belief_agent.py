@@ -86,7 +86,8 @@ class BeliefAgent(PlannerAgent):
         if self._belief is None:
             self._belief = ArrivalBelief(self.n, graph.cost.shape[1], heard.bins, self.model)
         belief = self._belief
-        belief.hear(pose, heard.bearing.numpy(), heard.distance.numpy(), active)
+        squares = heard.distance - torch.tensor([math.log(CELL), 0.0])
+        belief.hear(pose, heard.bearing.numpy(), squares.numpy(), active)
         if not (self.protocol.requires_stop and self.stop_by == "belief"):
             belief.rule_out(pose[:, :2], self._near, active)
         belief.score(graph.cost, active)

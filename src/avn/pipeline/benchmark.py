@@ -7,6 +7,7 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
+from avn.acoustics.sound_names import joined_names
 from avn.core.settings import plain
 from avn.modules.settings import SAME_WEIGHTS
 from avn.pipeline.apartments import TEST, TRAINING
@@ -164,7 +165,7 @@ def _follows(cfg: DictConfig, key: str, keys: Collection[str]) -> bool:
 
 def _text(value: object) -> str:
     """Return a setting's value as text; of sounds, their names."""
-    return "+".join(map(str, value)) if isinstance(value, dict) else str(value)
+    return joined_names([*map(str, value)]) if isinstance(value, dict) else str(value)
 
 
 def _named(cfg: DictConfig, group: str, changed: Mapping[str, str]) -> str:

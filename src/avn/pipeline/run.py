@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 from omegaconf import DictConfig, OmegaConf
 
+from avn.acoustics.sound_names import joined_names
 from avn.agents.rollout import Labels, Watch, rollout_scene
 from avn.apartments.splits import PARTS
 from avn.core.classes import build_object
@@ -36,7 +37,7 @@ from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import learns
 from avn.pipeline.recordings import keep_recordings
 from avn.pipeline.scenes import Geometry
-from avn.pipeline.sounds import dry_sounds, folder_of_sounds, sound_files, sounds_content
+from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
 from avn.pipeline.stage import Stage
 from avn.reporting import results
 from avn.reporting.finished_run import EPISODE_RECORDS, RESULTS
@@ -127,7 +128,7 @@ class Evaluation(Stage):
     @property
     def folder(self) -> Path:
         """`outputs/eval/<agent>/<sounds>/seed<seed>-<hash8>`."""
-        sounds = folder_of_sounds(sound_files(self.cfg))
+        sounds = joined_names(sound_files(self.cfg), "-")
         check_name("agent.name", self.cfg.agent.name)
         name = f"seed{self.cfg.seed}-{self.fingerprint[:8]}"
         return Path(self.cfg.outputs) / "eval" / self.cfg.agent.name / sounds / name

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 from omegaconf import DictConfig
 
+from avn.acoustics.sound_names import joined_names
 from avn.pipeline.sounds import sound_files
 from avn.reporting import results
 from avn.reporting.breakdown import DISTANCES, breakdown
@@ -58,7 +59,7 @@ def _settings(cfg: DictConfig, read: Collection[str]) -> dict[str, Any]:
     nodes = {key.split(".")[0] for key in read}
     leaves = {key.rsplit(".", 1)[-1] for key in read}
     settings = {key: cfg[key].name for key in ("agent", "protocol", "acoustics", "split")}
-    settings |= {"kind": "run", "sound": "+".join(sound_files(cfg))}
+    settings |= {"kind": "run", "sound": joined_names(sound_files(cfg))}
     parts = ("sound_model", "mapper", "planner")
     settings |= {key: cfg[key].name for key in parts if key in nodes}
     scalars = ("seed", "train_seed", "episodes", "subset", "look", "exploration", "localisation")

@@ -15,6 +15,7 @@ from typing import Any
 
 import yaml
 
+from avn.acoustics.sound_names import joined_names
 from avn.core.errors import UserError
 
 # Columns, in order. `sort` and filters take them by these names.
@@ -126,7 +127,7 @@ def _row(folder: Path) -> Row:
     row |= {key: _name(cfg, key) for key in ("agent", "protocol", "acoustics", "split")}
     row |= {key: cfg.get(key) for key in ("subset", "episodes", "seed", "train_seed")}
     sounds = cfg.get("sound")
-    row["sound"] = "+".join(map(str, sounds)) if isinstance(sounds, dict) else None
+    row["sound"] = joined_names([*map(str, sounds)]) if isinstance(sounds, dict) else None
     changed = datetime.fromtimestamp((folder / _RESULTS).stat().st_mtime, UTC)
     return row | {"date": changed.strftime("%Y-%m-%d %H:%M"), "folder": str(folder)}
 

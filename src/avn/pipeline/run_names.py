@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from avn.acoustics.sound_names import joined_names
 from avn.core.settings import plain
 from avn.pipeline.benchmark import PAPER_WORLD, changed_settings, compared
 from avn.pipeline.replay import Run
@@ -63,7 +64,7 @@ def _parts(run: Run, runs: Sequence[Run]) -> dict[str, str]:
         _label(key): str(plain(run.cfg, key)) for key in (*changed, *seeds) if _tells(key, runs)
     }
     if sounds and len({tuple(other.cfg.sound) for other in runs}) > 1:
-        parts["sound"] = "+".join(map(str, run.cfg.sound))
+        parts["sound"] = joined_names([*map(str, run.cfg.sound)])
     return parts
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
@@ -15,8 +14,6 @@ from avn.core.files import check_name
 from avn.core.settings import plain
 from avn.pipeline.apartments import TEST, WorldKeys
 from avn.reporting.results import ALL_SOUNDS
-
-LONGEST_FOLDER = 200  # bytes; file systems have names of up to 255
 
 
 def sound_files(cfg: DictConfig, world: WorldKeys = TEST) -> dict[str, str]:
@@ -34,12 +31,6 @@ def sound_files(cfg: DictConfig, world: WorldKeys = TEST) -> dict[str, str]:
         if name == ALL_SOUNDS:
             raise UserError(f"{world.sounds}: '{name}' is the row of all sounds; rename it")
     return sounds
-
-
-def folder_of_sounds(names: Collection[str]) -> str:
-    """Return the name of the folder of runs with some sounds: all names, or of many the number."""
-    joined = "-".join(names)
-    return joined if len(joined.encode()) <= LONGEST_FOLDER else f"{len(names)}-sounds"
 
 
 def dry_sounds(cfg: DictConfig, world: WorldKeys = TEST) -> DrySounds:

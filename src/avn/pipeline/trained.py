@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from avn.acoustics.sound_names import joined_names
 from avn.core.errors import UserError
 from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest, file_hash
@@ -205,7 +206,7 @@ class Trained(Stage):
             world["acoustics"] = str(self.train.node("acoustics").name)
         world["split"] = str(self.train.node("split").name)
         if TRAINING.sounds in read:
-            world["sounds_in_training"] = "+".join(map(str, self.train.node("sounds")))
+            world["sounds_in_training"] = joined_names([*map(str, self.train.node("sounds"))])
         return world
 
     def _write_events(self, metrics: dict[str, Any]) -> None:

@@ -9,7 +9,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.apartments.floor_plan import CELL
 from avn.core.actions import HEADINGS
 from avn.planning.searched import rule_out
 from avn.planning.settings import ArrivalModel
@@ -82,7 +81,7 @@ class ArrivalBelief:
         bearing : (N, B) float32
             Log-probability of each direction of arrival, clockwise from the agent's front.
         distance : (N, 2) float32
-            Mean and standard deviation of the natural logarithm of the path's length in metres.
+            Mean and standard deviation of the natural logarithm of the path's length in squares.
         active : (N,) bool
             Agents to update.
         """
@@ -221,9 +220,9 @@ def _score(  # type: ignore[no-untyped-def]
     bearing, log_length, precision = terms
     size, slots = cost.shape[1], kept.shape[1]
     logs = np.empty(_LENGTHS, dtype=np.float32)
-    logs[0] = math.log(0.5 * CELL)  # of the square where the agent is
+    logs[0] = math.log(0.5)  # of the square where the agent is
     for i in range(1, len(logs)):
-        logs[i] = math.log(i * SQUARES * CELL)
+        logs[i] = math.log(i * SQUARES)
     for n in numba.prange(len(cost)):
         if not active[n]:
             continue
