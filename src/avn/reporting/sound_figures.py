@@ -157,20 +157,22 @@ class SoundFigures(Callback):
     ----------
     every : int
         Epochs between figures of locations; the first and last epoch are always logged.
+    sounds : int
+        Number of sounds of which there are figures, the first ones.
     """
 
-    def __init__(self, every: int = 5) -> None:
-        self.every = every
+    def __init__(self, every: int = 5, sounds: int = 3) -> None:
+        self.every, self.sounds = every, sounds
 
     def on_train_start(self, trainer: L.Trainer, pl_module: Any) -> None:
-        """Log spectrograms and audio of every sound, in sight and out of sight."""
+        """Log spectrograms and audio of the first sounds, in sight and out of sight."""
         writer = tensorboard_writer(trainer)
         if trainer.current_epoch or writer is None:
             return
         clips = trainer.datamodule.measured_clips["validation"]  # type: ignore[attr-defined]
         for seen, sight in ((True, "in sight"), (False, "out of sight")):
             pairs = torch.nonzero(clips.in_sight == seen)[:1, 0]
-            for index, sound in enumerate(clips.sounds.names if len(pairs) else ()):
+            for index, sound in enumerate(clips.sounds.names[: self.sounds] if len(pairs) else ()):
                 batch = clips.__getitems__(clips.item(pairs, torch.tensor(index), 0).tolist())
                 right, front = batch["target"][0, -2:].tolist()  # locations stand last
                 title = f"{sound} {sight}: {right:+.1f} m right, {front:+.1f} m front"
@@ -193,7 +195,7 @@ class SoundFigures(Callback):
         clips, scene = data.measured_clips["validation"], data.scenes["validation"][0]
         # The states of source 0 in the first apartment come first.
         states = torch.arange(4 * len(scene.grid.lattice))
-        for index, sound in enumerate(clips.sounds.names):
+        for index, sound in enumerate(clips.sounds.names[: self.sounds]):
             items = clips.item(states, torch.tensor(index), 0)
             batches = [clips.__getitems__(part.tolist()) for part in items.split(128)]
             with torch.inference_mode():

@@ -122,13 +122,15 @@ class StopFigures(Callback):
     ----------
     every : int
         Epochs between figures; the first and last epoch are always logged.
+    sounds : int
+        Number of sounds of which there are figures, the first ones.
     """
 
-    def __init__(self, every: int = 5) -> None:
-        self.every = every
+    def __init__(self, every: int = 5, sounds: int = 3) -> None:
+        self.every, self.sounds = every, sounds
 
     def on_validation_epoch_end(self, trainer: L.Trainer, pl_module: Any) -> None:
-        """Log a map for each sound, and the curves over all sounds."""
+        """Log a map for each of the first sounds, and the curves over them."""
         epoch = trainer.current_epoch + 1
         due = epoch % self.every == 0 or epoch in (1, trainer.max_epochs)
         if not due or (writer := tensorboard_writer(trainer)) is None:
@@ -139,7 +141,7 @@ class StopFigures(Callback):
         states = torch.arange(4 * len(scene.grid.lattice))
         at_goal = clips.target[states].eq(0).numpy()
         found = []
-        for index, sound in enumerate(clips.sounds.names):
+        for index, sound in enumerate(clips.sounds.names[: self.sounds]):
             items = clips.item(states, torch.tensor(index), 0)
             batches = [clips.__getitems__(part.tolist())["clips"] for part in items.split(128)]
             with torch.inference_mode():
