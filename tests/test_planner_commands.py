@@ -39,9 +39,8 @@ def test_it_sees_hears_maps_and_walks(command, outputs, protocol):
         assert set(episodes["outcome"]) <= {"success", "stopped_elsewhere", "out_of_actions"}
 
 
-@pytest.mark.parametrize("more", [("protocol=stop", "look=around"), ("protocol=var",)])
-def test_it_follows_how_the_sound_arrives(command, outputs, more):
-    world = ("acoustics=diffraction", *more)
+def test_it_follows_how_the_sound_arrives(command, outputs):
+    world = ("protocol=stop", "look=around")
     code, out, err = ours(command, outputs, "agent=belief", *world)
     assert code == 0, err
     folder, episodes = Path(out[-1]), records(out)
@@ -52,7 +51,7 @@ def test_it_follows_how_the_sound_arrives(command, outputs, more):
 
 def test_exact_arrivals_are_an_oracle_input(command, outputs):
     exact = ("agent.oracle_inputs=[arrival]", "agent.privileged=true")
-    code, out, err = ours(command, outputs, "agent=belief", "acoustics=diffraction", *exact)
+    code, out, err = ours(command, outputs, "agent=belief", *exact)
     assert code == 0, err
     assert set(records(out)["agent"]) == {"belief-true-arrival"}
     code, _, err = ours(command, outputs, "agent=plan_noexp", *exact)

@@ -18,6 +18,7 @@ CONFIG = {
     "processes": 1,
     "auto": True,
     "force": False,
+    "numerics": "native",
     "rate": 3,
     "ore": {"kind": "iron", "tons": 5, "label": "a"},
     "furnace": {"heat": "${rate}", "colour": "red"},
@@ -150,7 +151,7 @@ def test_a_raised_version_makes_anew_what_depends_on_it(config, monkeypatch):
 
 
 def test_what_is_read_is_read_by_needs_and_through_references(config):
-    machine = {"outputs", "processes", "auto", "force"}
+    machine = {"outputs", "processes", "auto", "force", "numerics"}
     assert Ore(config()).read() == machine | {"ore.kind", "ore.tons"}
     assert Bridge(config()).read() == machine | {
         "ore.kind",

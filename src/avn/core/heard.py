@@ -39,7 +39,7 @@ def bearing_label(arrival: Tensor, bins: int, spread: float) -> Tensor:
 
 @dataclass(frozen=True)
 class Arrivals:
-    """What is heard of the arrival of a sound.
+    """Arrival of a sound, as a network hears it.
 
     Parameters
     ----------

@@ -52,9 +52,23 @@ def arrivals(scene: Scene, acoustics: AcousticsConfig) -> Tensor:
 
 
 def true_arrivals(scene: Scene, acoustics: AcousticsConfig, bins: int = 72) -> Tensor:
-    """Return the ground truth in the form of what is heard, (K, S, bins + 6); see `Arrivals`.
+    """Return the ground truth in the form of what is heard.
 
     Directions are spread by a bin, logarithms of lengths by 0.1 and locations by 0.1 m.
+
+    Parameters
+    ----------
+    scene : Scene
+        Apartment with K sources and S states.
+    acoustics : AcousticsConfig
+        Its regime and heights are used.
+    bins : int
+        Directions of arrival.
+
+    Returns
+    -------
+    (K, S, bins + 6) float32 tensor
+        See `avn.core.heard.Arrivals`.
     """
     truth, (_, in_sight) = arrivals(scene, acoustics), locate_sources(scene)
     direction, length, location = truth.split((2, 1, 2), -1)
