@@ -33,6 +33,7 @@ aaaaaaaabbbbbbbb
 aaaaaaa#bbbbbbbb
 """
 BINS = 72
+SIZE = 35  # squares of the map, enough from every start
 VAR = Protocol("var", "box", False, "moves", max_moves_ratio=2.0, exploration_steps=0)
 STOP = Protocol("stop", "radius", True, "metres", exploration_steps=0)
 
@@ -77,14 +78,14 @@ def run(agent: BeliefAgent, protocol: Protocol, arrival: Tensor | None = None) -
 @pytest.mark.parametrize("protocol", [VAR, STOP], ids=["var", "stop"])
 @pytest.mark.parametrize("look", ["once", "around"])
 def test_with_true_senses_it_arrives_by_nearly_shortest_paths(protocol: Protocol, look: str):
-    frame = run(BeliefAgent(OccupancyMapper(), look=look, obstacle_threshold=0.01), protocol)
+    frame = run(BeliefAgent(OccupancyMapper(SIZE), look=look, obstacle_threshold=0.01), protocol)
     assert frame["success"].mean() > 0.97
     assert frame["spl"].mean() > 0.9
 
 
 def test_directions_alone_lead_to_the_source():
     model = ArrivalModel(distance_weight=0)
-    frame = run(BeliefAgent(OccupancyMapper(), model=model, obstacle_threshold=0.01), VAR)
+    frame = run(BeliefAgent(OccupancyMapper(SIZE), model=model, obstacle_threshold=0.01), VAR)
     assert frame["success"].mean() > 0.95
 
 
@@ -93,33 +94,33 @@ def test_an_agent_that_hears_nothing_arrives_less_often():
     nothing = torch.zeros_like(heard(scene))
     nothing[..., :BINS] = -math.log(BINS)
     nothing[..., BINS + 1] = 10.0
-    frame = run(BeliefAgent(OccupancyMapper(), obstacle_threshold=0.01), VAR, nothing)
+    frame = run(BeliefAgent(OccupancyMapper(SIZE), obstacle_threshold=0.01), VAR, nothing)
     assert frame["success"].mean() < 0.7
 
 
 def test_the_classifier_can_decide_to_stop():
-    agent = BeliefAgent(OccupancyMapper(), stop_by="classifier", obstacle_threshold=0.01)
+    agent = BeliefAgent(OccupancyMapper(SIZE), stop_by="classifier", obstacle_threshold=0.01)
     assert "stop_probability" in agent.wants(STOP)
     assert "stop_probability" not in agent.wants(VAR)
     assert run(agent, STOP)["success"].mean() > 0.97
 
 
 def test_equal_runs_have_equal_records():
-    frames = [run(BeliefAgent(OccupancyMapper(), obstacle_threshold=0.01), STOP) for _ in range(2)]
+    frames = [run(BeliefAgent(OccupancyMapper(SIZE), obstacle_threshold=0.01), STOP) for _ in range(2)]
     pd.testing.assert_frame_equal(*frames)
 
 
 def test_settings_without_effect_are_named():
-    agent = BeliefAgent(OccupancyMapper())
+    agent = BeliefAgent(OccupancyMapper(SIZE))
     assert {"source_filter", "error", "stop_by"} <= set(agent.unused_settings(VAR))
     assert "stop_by" not in agent.unused_settings(STOP)
-    other = BeliefAgent(OccupancyMapper(), stop_by="classifier")
+    other = BeliefAgent(OccupancyMapper(SIZE), stop_by="classifier")
     assert "stop_above" in other.unused_settings(STOP)
     assert dataclasses.asdict(agent.model) == dataclasses.asdict(ArrivalModel())
     with pytest.raises(UserError, match=r"planner\.stop_by: 'luck'"):
-        BeliefAgent(OccupancyMapper(), stop_by="luck")
+        BeliefAgent(OccupancyMapper(SIZE), stop_by="luck")
     with pytest.raises(UserError, match=r"planner\.stop_above: 0"):
-        BeliefAgent(OccupancyMapper(), stop_above=0)
+        BeliefAgent(OccupancyMapper(SIZE), stop_above=0)
 
 
 def test_the_goal_is_that_of_the_protocol():
