@@ -95,6 +95,7 @@ def find_readers(keys: Mapping[str, Sequence[str]], values: Mapping[str, Sequenc
     runs.append(("eval", "agent=external", f"baseline.observations=[{','.join(OBSERVATIONS)}]"))
     runs += [("train", f"model={model}") for model in options_of("model")]
     unseen = {group: set(options_of(group)) for group in keys}
+    unseen["sound"] = set()  # recordings, which no stage tells apart
     kinds: dict[frozenset[str], tuple[str, ...]] = {}
     for run in [*runs, ("generate",)]:
         kinds.setdefault(frozenset(readers.add(run)), run)
