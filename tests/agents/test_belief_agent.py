@@ -106,7 +106,9 @@ def test_the_classifier_can_decide_to_stop():
 
 
 def test_equal_runs_have_equal_records():
-    frames = [run(BeliefAgent(OccupancyMapper(SIZE), obstacle_threshold=0.01), STOP) for _ in range(2)]
+    frames = [
+        run(BeliefAgent(OccupancyMapper(SIZE), obstacle_threshold=0.01), STOP) for _ in range(2)
+    ]
     pd.testing.assert_frame_equal(*frames)
 
 
