@@ -14,6 +14,28 @@ aaaaa#bbbbb
 aaaaa#bbbbb
 """
 
+# Two rooms, a wall between them with one doorway, and a dead end on the straight way.
+FLAT = """
+aaaaaaa#bbbbbbbb
+aaaaaaa#bbbbbbbb
+aaaa#####bbbbbbb
+aaaa#aa#bbbbbBbb
+aaaaaaa#bbbbbbbb
+aaaaaaaabbbbbbbb
+aaaaaaa#bbbbbbbb
+"""
+VAR = Protocol(
+    name="var",
+    goal="box",
+    requires_stop=False,
+    path_length="moves",
+    max_moves_ratio=2.0,
+    exploration_steps=0,
+)
+STOP = Protocol(
+    name="stop", goal="radius", requires_stop=True, path_length="metres", exploration_steps=0
+)
+
 
 @pytest.fixture
 def two_rooms() -> DrawnScene:

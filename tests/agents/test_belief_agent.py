@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from small_places import FLAT, STOP, VAR
 from torch import Tensor
 
 from avn.agents.belief_agent import BeliefAgent, goal_offsets
@@ -23,19 +24,8 @@ from avn.navigation.protocols import Protocol
 from avn.planning.settings import ArrivalModel
 from avn.planning.sound_fields import SQUARES, sound_fields
 
-FLAT = """
-aaaaaaa#bbbbbbbb
-aaaaaaa#bbbbbbbb
-aaaa#####bbbbbbb
-aaaa#aa#bbbbbBbb
-aaaaaaa#bbbbbbbb
-aaaaaaaabbbbbbbb
-aaaaaaa#bbbbbbbb
-"""
 BINS = 72
 SIZE = 35  # squares of the map, enough from every start
-VAR = Protocol("var", "box", False, "moves", max_moves_ratio=2.0, exploration_steps=0)
-STOP = Protocol("stop", "radius", True, "metres", exploration_steps=0)
 
 
 def heard(scene: DrawnScene) -> Tensor:

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from small_places import FLAT, STOP, VAR
 from torch import Tensor
 
 from avn.agents.planner_agent import PlannerAgent
@@ -18,28 +19,7 @@ from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 
-# Two rooms, a wall between them with one doorway, and a dead end on the straight way.
-FLAT = """
-aaaaaaa#bbbbbbbb
-aaaaaaa#bbbbbbbb
-aaaa#####bbbbbbb
-aaaa#aa#bbbbbBbb
-aaaaaaa#bbbbbbbb
-aaaaaaaabbbbbbbb
-aaaaaaa#bbbbbbbb
-"""
 LABELS = Labels("ours", "resonance")
-VAR = Protocol(
-    name="var",
-    goal="box",
-    requires_stop=False,
-    path_length="moves",
-    max_moves_ratio=2.0,
-    exploration_steps=0,
-)
-STOP = Protocol(
-    name="stop", goal="radius", requires_stop=True, path_length="metres", exploration_steps=0
-)
 
 
 def flat() -> DrawnScene:

@@ -110,8 +110,8 @@ def goal_offsets(protocol: Protocol) -> NDArray[np.int64]:
     They are those of a protocol's goal without walls: the 3 x 3 squares, or those that fewer moves
     than the radius lead to.
     """
-    most = 1 if protocol.goal == "box" else math.ceil(protocol.radius / CELL)
+    most = 1 if protocol.goal == "box" else protocol.most_goal_moves
     offsets = np.stack(np.meshgrid(*[np.arange(-most, most + 1)] * 2), -1).reshape(-1, 2)
     if protocol.goal == "box":
         return offsets
-    return offsets[CELL * np.abs(offsets).sum(1) < protocol.radius]
+    return offsets[np.abs(offsets).sum(1) <= most]

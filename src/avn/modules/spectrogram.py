@@ -91,7 +91,7 @@ class Spectrogram(nn.Module):
         """Map clips (N, 2, rate) to spectrograms (N, channels, bands, frames)."""
         spectra = self._stft(clips)
         real, imaginary = spectra.real.contiguous(), spectra.imag.contiguous()
-        values = real.new_empty(len(clips), 4 if self.interaural else 2, *real.shape[2:])
+        values = real.new_empty(len(clips), self.channels, *real.shape[2:])
         values[:, :2] = real.square().addcmul_(imaginary, imaginary)
         if self.interaural:
             # Left times the conjugate of right.

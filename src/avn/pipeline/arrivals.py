@@ -6,18 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import torch
-from omegaconf import DictConfig
 from torch import Tensor
 
-from avn.core.classes import import_class
 from avn.pipeline.audio_inference import AudioInference
-from avn.pipeline.sound_network import SoundNetwork, has_sound_model
-
-
-def hears_arrivals(cfg: DictConfig) -> bool:
-    """Return whether the config's sound network has heads."""
-    target = cfg.sound_model._target_
-    return has_sound_model(cfg) and hasattr(import_class("sound_model", target), "arrival")
+from avn.pipeline.sound_network import SoundNetwork
 
 
 class ArrivalEstimates(AudioInference):

@@ -18,13 +18,13 @@ from avn.dataset.scene import Scene
 from avn.dataset.source_locations import locate_sources
 from avn.navigation.observations import RenderedAudio, SceneObservations
 from avn.pipeline.apartments import Apartments
-from avn.pipeline.arrivals import ArrivalEstimates, hears_arrivals
+from avn.pipeline.arrivals import ArrivalEstimates
 from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.occupancy import LocalPatches, has_occupancy_model, true_local_patches
 from avn.pipeline.rendered_audio import Spectrograms, Waveforms
 from avn.pipeline.scenes import acoustics_of
-from avn.pipeline.sound_network import SourceEstimates, has_sound_model
+from avn.pipeline.sound_network import SourceEstimates, has_sound_model, hears_arrivals
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stop_classifier import StopProbabilities, has_stop_model
 from avn.pipeline.views import RenderedViews

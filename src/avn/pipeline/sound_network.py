@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import torch
 from omegaconf import DictConfig
 
-from avn.core.classes import build_object
+from avn.core.classes import build_object, import_class
 from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.scenes import acoustics_of
 from avn.pipeline.trained_on_clips import TrainedOnClips
@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 def has_sound_model(cfg: DictConfig) -> bool:
     """Return whether the config has a sound network."""
     return bool(cfg.sound_model.name != "none")
+
+
+def hears_arrivals(cfg: DictConfig) -> bool:
+    """Return whether the config's sound network has heads for how a sound arrives."""
+    target = cfg.sound_model._target_
+    return has_sound_model(cfg) and hasattr(import_class("sound_model", target), "arrival")
 
 
 class SoundNetwork(TrainedOnClips):
@@ -48,9 +54,8 @@ class SoundNetwork(TrainedOnClips):
         """Return the data module of clips and source locations, or arrivals for heads."""
         from avn.datamodules.arrival import ArrivalData
         from avn.datamodules.sound import SoundData
-        from avn.modules.arrival_cnn import ArrivalCnn
 
-        if isinstance(self.untrained(), ArrivalCnn):
+        if hears_arrivals(self.cfg):
             return ArrivalData(acoustics_of(self.train), **self.clips())
         return SoundData(**self.clips())
 

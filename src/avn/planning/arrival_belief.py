@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.actions import HEADINGS
-from avn.planning.searched import rule_out
+from avn.planning.searched import Searched
 from avn.planning.settings import ArrivalModel
 from avn.planning.sound_fields import SQUARES, sound_fields
 
@@ -22,7 +22,7 @@ _LENGTHS = 4096
 _OUTLIER = 8.0
 
 
-class ArrivalBelief:
+class ArrivalBelief(Searched):
     """Posterior of N agents over the square of the source, on M x M squares each.
 
     Evidence is what was heard at the last K squares at which an agent was: a distribution of the
@@ -43,14 +43,12 @@ class ArrivalBelief:
     ----------
     log_belief : (N, M, M) float32
         Logarithm of the posterior up to a constant; -inf where the source cannot be.
-    searched : (N, M, M) bool
-        Squares that do not hold the source.
     """
 
     def __init__(self, n: int, size: int, bins: int, model: ArrivalModel) -> None:
+        super().__init__(n, size)
         self.model, self.bins, slots = model, bins, model.places
         self.log_belief = np.zeros((n, size, size), dtype=np.float32)
-        self.searched = np.zeros((n, size, size), dtype=np.bool_)
         # a ring of places for each agent, and the place where it is now
         self._newest = np.zeros(n, dtype=np.int64)
         self._position = np.full((n, slots, 2), -1, dtype=np.int64)
@@ -173,10 +171,6 @@ class ArrivalBelief:
         once = total / (count > 0).sum(1)
         weight = model.distance_weight * self._weight[row, slot]
         return (mean * precision).sum(1) / total, weight * once
-
-    def rule_out(self, position: NDArray[np.int64], reach: int, rows: NDArray[np.bool_]) -> None:
-        """Mark the squares around agents as searched. See `rule_out`."""
-        rule_out(self.searched, position, reach, rows)
 
     def targets(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return the column and row of each agent's likeliest square, (N, 2) int64.

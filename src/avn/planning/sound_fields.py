@@ -42,7 +42,8 @@ def sound_fields(
     Parameters
     ----------
     cost : (N, M, M) float32
-        Cost of entering each square, 1 or more; infinite without a node. See `PartialGraph`.
+        Cost of entering each square, 1 or more; infinite without a node. See `PartialGraph`. A step
+        has at most 31 units of length, so costs above 4.4 are 4.4 on a diagonal, above 6.2 else.
     position : (N, K, 2) int64
         Column and row at which each of N agents has been K times.
     row, slot : (R,) int64

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.errors import UserError
-from avn.planning.searched import rule_out
+from avn.planning.searched import Searched
 from avn.planning.settings import SourceErrorModel
 
 FILTERS = ("latest", "bayes")
 
 
-class SourceBelief:
+class SourceBelief(Searched):
     """Belief of N agents about the position of the source, on M x M squares each.
 
     Parameters
@@ -30,8 +30,6 @@ class SourceBelief:
     ----------
     source_estimate : (N, 2) float64
         Newest estimate: column and row, counted from the corner of the map.
-    searched : (N, M, M) bool
-        Squares that do not hold the source.
 
     Raises
     ------
@@ -44,9 +42,9 @@ class SourceBelief:
             raise UserError(
                 f"planner.source_filter: '{source_filter}' is none of {', '.join(FILTERS)}"
             )
+        super().__init__(n, size)
         self.source_filter, self.error = source_filter, error
         self.source_estimate = np.full((n, 2), size // 2, dtype=np.float64)
-        self.searched = np.zeros((n, size, size), dtype=np.bool_)
         cells = size if source_filter == "bayes" else 0
         self._log_belief = np.zeros((n, cells, cells), dtype=np.float32)
 
@@ -73,10 +71,6 @@ class SourceBelief:
             e = self.error
             own = (e.sigma, e.sigma_per_metre, e.front_back_prob, e.outlier_prob, e.weight)
             _weigh(self._log_belief, position, source_estimate, mirror_image, active, own)
-
-    def rule_out(self, position: NDArray[np.int64], reach: int, rows: NDArray[np.bool_]) -> None:
-        """Mark the squares around agents as searched. See `rule_out`."""
-        rule_out(self.searched, position, reach, rows)
 
     def targets(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Choose the node where each agent looks for the source next.
