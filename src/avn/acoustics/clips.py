@@ -33,6 +33,7 @@ HOP_SECONDS = 0.01  # grid of the positions at which a second may begin
 LEAST_LEVEL = 0.5  # of the usual level of the sound: -6 dB
 NOISE_SAMPLES = 1 << 19  # 33 s of noise for each ear
 EXPORT_FACTOR = 0.1
+_FIRST_DRAW = 2  # draws of a clip before those of its microphone: position and phase
 
 
 class DrySounds:
@@ -168,17 +169,31 @@ class ClipRenderer:
         sound = clip.sound
         words = torch.stack(clip._replace(sound=self.sounds.keys[sound]), dim=-1)
         key = absorb(self._key, words.to(torch.int64))
-        place, phase, left, right = (integers(key, draw) for draw in range(4))
+        place, phase = (integers(key, draw) for draw in range(_FIRST_DRAW))
         dry = torch.fft.rfft(self.sounds.seconds(sound, place, phase))
         used = spectra if index is None else spectra[index]
         clips = torch.fft.irfft(dry[:, None, :] * used, n=self.sounds.rate)
-        draws = (left, right)
+        return self.microphone.record(clips, _Noise(self._noise, self.sounds.rate, key))
 
-        def noise(ear: int) -> Tensor:
-            pieces = self._noise[ear].unfold(0, self.sounds.rate, 1)
-            return pieces[draws[ear] % len(pieces)]
 
-        return self.microphone.record(clips, noise)
+class _Noise:
+    """Random numbers of N clips; see `avn.acoustics.microphone.ClipNoise`."""
+
+    def __init__(self, bank: Tensor, rate: int, key: Tensor) -> None:
+        self._bank, self._rate, self._key = bank, rate, key
+
+    def __call__(self, ear: int) -> Tensor:
+        """Return noise of RMS 1 for an ear, (N, rate) float32."""
+        pieces = self._bank[ear].unfold(0, self._rate, 1)
+        return pieces[integers(self._key, _FIRST_DRAW + ear) % len(pieces)]
+
+    def integers(self, draw: int) -> Tensor:
+        """Return further random integers of the clips, (N,) int64."""
+        return integers(self._key, _FIRST_DRAW + 2 + draw)
+
+    def uniform(self, draw: int) -> Tensor:
+        """Return further random numbers of 0 to 1, (N,) float32."""
+        return self.integers(draw).double().div_(2.0**63).float()
 
 
 def brir_spectra(brirs: Tensor, rate: int = RATE) -> Tensor:

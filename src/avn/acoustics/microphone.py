@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import isfinite
+from typing import Protocol
 
 from torch import Tensor
 
 from avn.core.errors import UserError
+
+
+class ClipNoise(Protocol):
+    """Random numbers of N clips: a pure function of the identity of each clip."""
+
+    def __call__(self, ear: int) -> Tensor:
+        """Return noise of RMS 1 for ear 0 or 1, (N, T) float32; the ears are independent."""
+
+    def integers(self, draw: int) -> Tensor:
+        """Return draw 0, 1, 2, ... of each clip, (N,) int64, uniform over 0 to 2^63 - 1."""
+
+    def uniform(self, draw: int) -> Tensor:
+        """Return that draw as a number of 0 to 1, (N,) float32."""
 
 
 class Microphone:
@@ -37,15 +50,15 @@ class Microphone:
             raise UserError(f"microphone.gain={gain}: give more than 0, such as 1.0")
         self.noise_rms, self.gain = noise_rms, gain
 
-    def record(self, clips: Tensor, noise: Callable[[int], Tensor]) -> Tensor:
+    def record(self, clips: Tensor, noise: ClipNoise) -> Tensor:
         """Record clips; may change them in place.
 
         Parameters
         ----------
         clips : (N, 2, T) float32 tensor
             Sound at the left and the right ear.
-        noise : callable
-            Returns noise of RMS 1 for ear 0 or 1, (N, T), the same at every call.
+        noise : ClipNoise
+            Its call returns noise of RMS 1 for ear 0 or 1, (N, T), the same at every call.
 
         Returns
         -------
