@@ -21,6 +21,7 @@ from avn.dataset.scene import Scene
 from avn.dataset.views import Views
 from avn.mapping.ego_map import WIDTH
 from avn.navigation.batched_episodes import BatchedEpisodes
+from avn.navigation.episodes import EXHAUSTIVE
 from avn.navigation.frozen_batch import FrozenBatch
 from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import SceneBatch, build_scene_batch
@@ -240,7 +241,7 @@ def _own_keys(
     if "map" in names:
         keys += ["mapper.size", "baseline.map_width"]
     if part == "test":
-        explores = cfg.episodes == "frozen" and cfg.protocol.exploration_steps > 0
+        explores = cfg.episodes != EXHAUSTIVE and cfg.protocol.exploration_steps > 0
         return (*keys, "seed", "episodes", "sound", *(["exploration"] if explores else []))
     limit = ["algorithm.max_steps"] if max_steps == OF_ALGORITHM else []
     return (*keys, "training.sounds", *limit)
@@ -251,7 +252,7 @@ def _unread_keys(cfg: DictConfig, part: str, max_steps: MaxSteps) -> tuple[str, 
     unread = ["protocol.name"]
     if cfg.protocol.goal != "radius":
         unread.append("protocol.radius")
-    if part != "test" or cfg.episodes != "frozen":
+    if part != "test" or cfg.episodes == EXHAUSTIVE:
         unread += ["protocol.num_starts", "protocol.exploration_steps"]
     limited = part == "test" or max_steps is None
     if not limited:

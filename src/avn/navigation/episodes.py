@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,15 @@ from avn.navigation.exploration import EXPLORATIONS, own_trajectories, shared_tr
 from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.protocols import Protocol
 
+# Lists of episodes: a frozen list of starts, walked with every sound or each with one sound, and
+# every start.
+FROZEN, ONE_SOUND, EXHAUSTIVE = "frozen", "one_sound", "exhaustive"
+LISTS = (FROZEN, ONE_SOUND, EXHAUSTIVE)
+
 
 @dataclass(frozen=True)
 class Episodes:
-    """N episodes of one scene, ordered by sound, source and start.
+    """N episodes of one scene.
 
     Attributes
     ----------
@@ -66,6 +71,7 @@ def frozen_episodes(
     protocol: Protocol,
     seed: int,
     exploration: str = "shared",
+    one_sound: bool = False,
 ) -> Episodes:
     """Draw the frozen list: `protocol.num_starts` episodes for each source and sound.
 
@@ -88,6 +94,9 @@ def frozen_episodes(
     exploration : {"shared", "own"}
         One trajectory for all episodes of the scene, or one for each start. With "own" a state
         may be the start of two episodes.
+    one_sound : bool
+        Whether each start is one episode, with one of the sounds, instead of one episode for each
+        sound. The sounds are drawn by the seed, each as often as the others, give or take one.
 
     Returns
     -------
@@ -132,9 +141,26 @@ def frozen_episodes(
         # each start of a source reads the same order from another offset
         own = order[:, turned].reshape(len(source), -1)
         starts = _first_allowed(own, left, 1)
-    return _over_sounds(
+    episodes = _over_sounds(
         scene, sounds, seed, source, starts.reshape(-1), trajectories, trajectory_index
     )
+    return _with_one_sound(episodes, len(source)) if one_sound else episodes
+
+
+def _with_one_sound(episodes: Episodes, starts: int) -> Episodes:
+    """Keep one episode of each start, with a sound drawn without replacement until all are used."""
+    key = np.uint64(derive("one sound", episodes.seed, episodes.scene))
+    rank = np.argsort(np.argsort(scramble(key, np.arange(starts)), kind="stable"), kind="stable")
+    # the sounds in an order of their own too, as some are left over where there are many
+    names = np.array([derive("sound", name) for name in episodes.sounds], dtype=np.uint64)
+    order = np.argsort(scramble(key, names), kind="stable")
+    sound = order[rank % len(order)]
+    rows = sound * starts + np.arange(starts)
+    chosen = {
+        name: getattr(episodes, name)[rows]
+        for name in ("number", "sound", "source", "start", "trajectory_index")
+    }
+    return replace(episodes, **chosen)
 
 
 def _first_allowed(

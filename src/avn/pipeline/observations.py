@@ -16,11 +16,13 @@ from avn.core.settings import typed
 from avn.dataset.arrivals import true_arrivals
 from avn.dataset.scene import Scene
 from avn.dataset.source_locations import locate_sources
+from avn.navigation.episodes import ONE_SOUND
 from avn.navigation.observations import RenderedAudio, SceneObservations
-from avn.pipeline.apartments import Apartments
+from avn.pipeline.apartments import TEST, Apartments
 from avn.pipeline.arrivals import ArrivalEstimates
 from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
+from avn.pipeline.live_audio import LiveInference
 from avn.pipeline.occupancy import LocalPatches, has_occupancy_model, true_local_patches
 from avn.pipeline.rendered_audio import Spectrograms, Waveforms
 from avn.pipeline.scenes import acoustics_of
@@ -210,10 +212,18 @@ class Observed:
         self.apartments, self.cfg = apartments, apartments.cfg
         self.names = [name for name in OBSERVATIONS if name in set(names)]
         self.clips, self._truth = clips or Clips(), truth
+        # each clip is heard in few episodes with one sound each
+        self._live = apartments.world == TEST and self.cfg.get("episodes") == ONE_SOUND
 
     def is_true(self, name: str) -> bool:
         """Return whether an observation is ground truth."""
         return OBSERVATIONS[name].truth in self._truth
+
+    def is_live(self, name: str) -> bool:
+        """Return whether a network's outputs are computed when they are heard, not in a table."""
+        observation = OBSERVATIONS[name]
+        tabulated = observation.audio and not observation.rendered
+        return self._live and tabulated and not self.is_true(name)
 
     def check(self, agent: str, wanted: Sequence[str]) -> None:
         """Refuse observations that do not exist or that the config has no network for.
@@ -251,10 +261,14 @@ class Observed:
     def stages(self) -> dict[str, Any]:
         """Stages of the observations that are not ground truth and that the config has."""
         return {
-            name: OBSERVATIONS[name].stage(self.cfg, self.apartments, self.clips)
+            name: self._stage(name)
             for name in self.names
             if not self.is_true(name) and OBSERVATIONS[name].there(self.cfg)
         }
+
+    def _stage(self, name: str) -> Any:
+        stage = OBSERVATIONS[name].stage(self.cfg, self.apartments, self.clips)
+        return LiveInference(stage) if self.is_live(name) else stage
 
     @property
     def settings(self) -> tuple[str, ...]:
@@ -285,8 +299,10 @@ class Observed:
             if self.is_true(name) and observation.true:
                 tensors = observation.true(self.apartments, scenes)
             else:
-                tensors = observation.load(stages[name])
-            kind = 2 if observation.rendered else 0 if observation.audio else 1
+                live = self.is_live(name)
+                tensors = stages[name].load() if live else observation.load(stages[name])
+            rendered = observation.rendered or self.is_live(name)
+            kind = 2 if rendered else 0 if observation.audio else 1
             for own, tensor in zip(observed, tensors, strict=True):
                 own[kind][name] = tensor
         return [

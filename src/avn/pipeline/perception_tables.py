@@ -47,7 +47,7 @@ def write(
         Folder of the run.
     """
     cfg, stages = observed.cfg, observed.stages
-    if "source_estimate" in stages:
+    if "source_estimate" in stages and not observed.is_live("source_estimate"):
         source_estimates = [one.audio["source_estimate"] for one in observations]
         results.write_csv(
             _source_estimates(cfg, scenes, source_estimates), folder / SOURCE_ESTIMATES

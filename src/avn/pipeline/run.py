@@ -17,7 +17,14 @@ from avn.core.errors import UserError
 from avn.core.files import atomic_write, check_name
 from avn.core.progress import progress_bar
 from avn.dataset.scene import Scene
-from avn.navigation.episodes import Episodes, exhaustive_episodes, frozen_episodes
+from avn.navigation.episodes import (
+    EXHAUSTIVE,
+    LISTS,
+    ONE_SOUND,
+    Episodes,
+    exhaustive_episodes,
+    frozen_episodes,
+)
 from avn.navigation.exploration import EXPLORATIONS
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
@@ -41,8 +48,6 @@ from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
 from avn.pipeline.stage import Stage
 from avn.reporting import results
 from avn.reporting.finished_run import EPISODE_RECORDS, RESULTS
-
-EPISODES = ("frozen", "exhaustive")
 
 
 def wanted_by(cfg: DictConfig) -> tuple[str, ...]:
@@ -102,14 +107,14 @@ class Evaluation(Stage):
     def ignored(self) -> Sequence[str]:
         """Return the keys that do not change this agent's records under this protocol."""
         radius = () if self.cfg.protocol.goal == "radius" else ("protocol.radius",)
-        frozen = self.cfg.episodes == "frozen"
+        frozen = self.cfg.episodes != EXHAUSTIVE
         lists = () if frozen else ("protocol.num_starts", "protocol.exploration_steps")
         cap = ("protocol.cap",) if self.cfg.protocol.max_moves_ratio is None else ()
         return (*agent_ignored(self.cfg), *radius, *lists, *cap)
 
     @property
     def _walks_first(self) -> bool:
-        return self.cfg.episodes == "frozen" and self.cfg.protocol.exploration_steps > 0
+        return self.cfg.episodes != EXHAUSTIVE and self.cfg.protocol.exploration_steps > 0
 
     def consulted(self) -> Sequence[str]:
         """Return the keys of the subset, of the sounds and of films of a finished run."""
@@ -136,8 +141,9 @@ class Evaluation(Stage):
     def seconds(self) -> float:
         """Estimate 5 ms per episode of an agent with a map or a network, 0.5 ms of others."""
         plans, sounds = self.apartments.plans, len(sound_files(self.cfg))
+        sounds = 1 if self.cfg.episodes == ONE_SOUND else sounds
         episodes = self.cfg.protocol.num_starts * sounds * sum(len(own.sources) for own in plans)
-        if self.cfg.episodes == "exhaustive":
+        if self.cfg.episodes == EXHAUSTIVE:
             episodes = 4 * self.apartments.pairs * sounds
         return episodes * (0.005 if self.cfg.planner._target_ or learns(self.cfg) else 0.0005)
 
@@ -147,7 +153,7 @@ class Evaluation(Stage):
         if not 0 <= cfg.seed < 2**62:
             raise UserError(f"seed: {cfg.seed} is out of range; give 0 or more")
         for key, known in (
-            ("episodes", EPISODES),
+            ("episodes", LISTS),
             ("subset", PARTS),
             ("exploration", EXPLORATIONS),
         ):
@@ -263,6 +269,7 @@ def episodes_of(cfg: DictConfig, scene: Scene, protocol: Protocol) -> Episodes:
         Protocol of the config.
     """
     sounds = list(sound_files(cfg))
-    if cfg.episodes == "exhaustive":
+    if cfg.episodes == EXHAUSTIVE:
         return exhaustive_episodes(scene, sounds, protocol, cfg.seed)
-    return frozen_episodes(scene, sounds, protocol, cfg.seed, cfg.exploration)
+    one_sound = cfg.episodes == ONE_SOUND
+    return frozen_episodes(scene, sounds, protocol, cfg.seed, cfg.exploration, one_sound)
