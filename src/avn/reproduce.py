@@ -15,10 +15,23 @@ from avn.core.progress import log
 
 @command("reproduce")
 def main(cfg: DictConfig) -> Path:
-    """Build what is missing, evaluate each row with each seed, and print the table."""
+    """Build what is missing, evaluate each row with each seed, and print the table.
+
+    With `table=conditions` each row is evaluated in each condition.
+    """
     from avn.config.defaults import default_config
+    from avn.pipeline.condition_table import tabulate
     from avn.pipeline.reproduction import reproduce, settings_of
 
+    if cfg.conditions:
+        pairs = [
+            (row, own) for row in dict.fromkeys(cfg.rows) for own in dict.fromkeys(cfg.conditions)
+        ]
+        composed = {pair: compose_row(cfg, *pair) for pair in pairs}
+        refuse_unread("reproduce", cfg, settings_of([*composed.values()]))
+        folder = tabulate(cfg, composed)
+        log(str(folder))
+        return folder
     rows = [compose_row(cfg, row) for row in dict.fromkeys(cfg.rows)]
     refuse_unread("reproduce", cfg, settings_of(rows))
     folder = reproduce(cfg, rows, [default_config(row) for row in rows])

@@ -49,7 +49,10 @@ _FLAGS = re.compile(
 _UNKNOWN_SOUND = re.compile(r"Could not (?:find|load) 'sound/(.*?)'")
 # Groups of which several options can be chosen at once.
 SEVERAL = ("logger", "callbacks")
-LIST_KEYS = ("rows", "sounds", "seeds", "train_seeds", "apartments", *SEVERAL)
+LIST_KEYS = (
+    *("rows", "conditions", "world", "sounds", "seeds", "train_seeds", "apartments"),
+    *SEVERAL,
+)
 _SWEEP = ("-m", "--multirun")
 USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
 

@@ -11,10 +11,13 @@ from avn.config.spare import compose_fitting
 from avn.core.errors import UserError
 
 # Overrides of `avn.reproduce` itself.
-_OWN = ("rows", "seeds", "train_seeds", "sounds", "experiment")
+_OWN = (
+    *("rows", "seeds", "train_seeds", "sounds", "experiment"),
+    *("table", "conditions", "world"),
+)
 
 
-def compose_row(cfg: DictConfig, row: str) -> DictConfig:
+def compose_row(cfg: DictConfig, row: str, condition: str = "none") -> DictConfig:
     """Compose the config of a row, with the overrides and the sounds of the command line.
 
     Parameters
@@ -23,6 +26,8 @@ def compose_row(cfg: DictConfig, row: str) -> DictConfig:
         Config of `avn.reproduce`.
     row : str
         Option of the group `agent`.
+    condition : str
+        Option of the group `condition`.
 
     Raises
     ------
@@ -30,7 +35,10 @@ def compose_row(cfg: DictConfig, row: str) -> DictConfig:
         For a sound that the row's config does not have.
     """
     shared = [o for o in HydraConfig.get().overrides.task if o.split("=")[0] not in _OWN]
-    config = compose_fitting("eval", [*shared, *spare.settings(), f"agent={row}"])
+    given = {override.split("=")[0] for override in shared}
+    world = [override for override in cfg.world if override.split("=")[0] not in given]
+    chosen = [f"agent={row}", f"condition={condition}"]
+    config = compose_fitting("eval", [*world, *shared, *spare.settings(), *chosen])
     name_files(config)
     for name in cfg.sounds:
         if name not in config.sound:

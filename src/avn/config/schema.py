@@ -229,6 +229,8 @@ class ReproduceConfig(CoreConfig):
     """Schema of `reproduce.yaml`."""
 
     rows: list[str] = MISSING
+    conditions: list[str] = MISSING
+    world: list[str] = MISSING
     sounds: list[str] = MISSING
     seeds: list[int] = MISSING
     train_seeds: list[int] = MISSING

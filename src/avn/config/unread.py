@@ -16,7 +16,7 @@ from avn.core.errors import UserError
 from avn.core.settings import leaves, plain
 
 # Groups that select what a command does; they may set keys that it does not read.
-_CHOOSE = ("agent", "model", "experiment")
+_CHOOSE = ("agent", "model", "condition", "table", "experiment")
 # Settings of the training world that have a default of their own.
 _OF_TRAINING = {"sound": "training.sounds", "microphone": "training.microphone"}
 

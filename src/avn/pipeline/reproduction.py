@@ -6,6 +6,7 @@ import copy
 import time
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import pandas as pd
 from omegaconf import DictConfig
@@ -57,15 +58,13 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig], defaults: Sequence[Di
     UserError
         Where an option cannot work, or something is missing and `auto` is false.
     """
-    for key in ("rows", "seeds", "train_seeds"):
-        if not cfg[key]:
-            raise UserError(f"{key}: empty; give at least one, such as rows=greedy seeds=0")
-    configs = [config for row in rows for config in _runs(cfg, row)]
+    check_lists(cfg)
+    configs = [config for row in rows for config in runs_of(cfg, row)]
     paper = paper_sounds_by_agent(rows, defaults)
-    folders = _make_runs(configs, paper)
+    folders = make_runs(configs, [str(config.agent.name) for config in configs], paper)
     tables, episodes = zip(*map(read_run, folders), strict=True)
     networks = [config.train_seed for config in configs]
-    runs, records = (_with_networks(own, networks) for own in (tables, episodes))
+    runs, records = (with_networks(own, networks) for own in (tables, episodes))
     privileged = {agent_label(config) for config in configs if config.agent.privileged}
     cells = published.published(records, paper)
     caption = _caption(rows, defaults)
@@ -84,9 +83,16 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig], defaults: Sequence[Di
     return target
 
 
+def check_lists(cfg: DictConfig) -> None:
+    """Raise `UserError` where there are no rows, seeds or networks."""
+    for key in ("rows", "seeds", "train_seeds"):
+        if not cfg[key]:
+            raise UserError(f"{key}: empty; give at least one, such as rows=greedy seeds=0")
+
+
 def settings_of(rows: Sequence[DictConfig]) -> set[str]:
     """Return the leaf keys of the config that a row or the command itself reads."""
-    keys = {"rows", "sounds", "seeds", "train_seeds"}
+    keys = {"rows", "conditions", "world", "sounds", "seeds", "train_seeds"}
     return keys.union(*(Evaluation(row).read() for row in rows))
 
 
@@ -96,10 +102,26 @@ def _caption(rows: Sequence[DictConfig], defaults: Sequence[DictConfig]) -> str:
     return caption_of(*max(pairs, key=lambda pair: len(Evaluation(pair[0]).read())))
 
 
-def _make_runs(configs: Sequence[DictConfig], paper: Mapping[str, Collection[str]]) -> list[Path]:
+def make_runs(
+    configs: Sequence[DictConfig],
+    names: Sequence[str],
+    paper: Mapping[str, Collection[str]] = MappingProxyType({}),
+) -> list[Path]:
     """Make all runs and what they need; print the plan first and each row when it is finished.
 
-    `paper` holds the sounds by agent beside which the paper's results stand.
+    Parameters
+    ----------
+    configs : sequence of DictConfig
+        Config of each run, as of `avn.eval`.
+    names : sequence of str
+        Name of each run's row, for the display; runs of one row follow each other.
+    paper : mapping of str to collection of str
+        Sounds by agent beside which the paper's results stand.
+
+    Returns
+    -------
+    list of Path
+        Folders of the runs.
     """
     runs = [Evaluation(cfg) for cfg in configs]
     for run in runs:
@@ -108,9 +130,9 @@ def _make_runs(configs: Sequence[DictConfig], paper: Mapping[str, Collection[str
     steps = missing(runs)
     announce(steps, {run.fingerprint for run in runs})
     averages = {row: f"{sr:.1f} / {spl:.1f}" for row, (sr, spl) in paper_averages(paper).items()}
-    rows = dict.fromkeys(cfg.agent.name for cfg in configs)
+    rows = dict.fromkeys(names)
     with Dashboard([(s.title, s.expected()) for s in steps], list(rows), averages) as board:
-        table = _Rows(runs, board)
+        table = _Rows(runs, names, board)
         table.fill()
         for stage in steps:
             make(stage, explicit=isinstance(stage, Evaluation))
@@ -122,20 +144,19 @@ def _make_runs(configs: Sequence[DictConfig], paper: Mapping[str, Collection[str
 class _Rows:
     """Rows of the table, filled in order as their runs finish."""
 
-    def __init__(self, runs: Sequence[Evaluation], board: Dashboard) -> None:
-        self._left, self._board = list(runs), board
+    def __init__(self, runs: Sequence[Evaluation], names: Sequence[str], board: Dashboard) -> None:
+        self._left, self._board = list(zip(runs, names, strict=True)), board
         self._finished: dict[str, list[Path]] = {}
         self._started = time.monotonic()
 
     def fill(self) -> None:
         """Add the next runs that are finished."""
-        while self._left and self._left[0].done():
-            run = self._left.pop(0)
-            row = str(run.cfg.agent.name)
+        while self._left and self._left[0][0].done():
+            run, row = self._left.pop(0)
             folders = self._finished.setdefault(row, [])
             folders.append(run.folder)
             self._board.fill(row, _average(folders))
-            if row not in [left.cfg.agent.name for left in self._left]:
+            if row not in [left for _, left in self._left]:
                 passed = format_duration(time.monotonic() - self._started)
                 log(f"{row}: {_average(folders)} after {passed}")
 
@@ -149,8 +170,16 @@ def _average(folders: Sequence[Path]) -> str:
     return f"{mean['sr']:.1f} / {mean['spl']:.1f}"
 
 
-def _runs(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:
-    """Return the configs of a row: one per seed, and per train_seed where it has networks."""
+def runs_of(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:
+    """Return the configs of a row: one per seed, and per train_seed where it has networks.
+
+    Parameters
+    ----------
+    cfg : DictConfig
+        Config of `avn.reproduce`.
+    composed : DictConfig
+        Config of the row.
+    """
     networks = list(dict.fromkeys(cfg.train_seeds))
     if "train_seed" not in Evaluation(composed).read():
         networks = [composed.train_seed]
@@ -163,8 +192,16 @@ def _runs(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:
     return runs
 
 
-def _with_networks(tables: Sequence[pd.DataFrame], networks: Sequence[int]) -> pd.DataFrame:
-    """Join the tables of runs, with the network of each run as the last column."""
+def with_networks(tables: Sequence[pd.DataFrame], networks: Sequence[int]) -> pd.DataFrame:
+    """Join the tables of runs, with the network of each run as the last column.
+
+    Parameters
+    ----------
+    tables : sequence of DataFrame
+        A table of each run.
+    networks : sequence of int
+        `train_seed` of each run.
+    """
     pairs = zip(tables, networks, strict=True)
     return pd.concat([own.assign(**{NETWORK: network}) for own, network in pairs])
 
