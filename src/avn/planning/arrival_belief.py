@@ -16,10 +16,11 @@ from avn.planning.sound_fields import SQUARES, sound_fields
 
 # Weight below which evidence is left out.
 _LEAST_WEIGHT = 1e-3
+_LEAST_PRECISION = 1e-6
 # Length in units of `sound_fields` up to which logarithms are tabulated.
 _LENGTHS = 4096
-# Bound of what a wrong length costs, so that one outlier does not decide.
-_OUTLIER = 8.0
+# Standard deviations at which the error of a length is cut off, so that no outlier decides.
+_OUTLIER = 4.0
 
 
 class ArrivalBelief(Searched):
@@ -143,6 +144,7 @@ class ArrivalBelief(Searched):
             kept,
             position,
             self.model.reach,
+            self.model.bias,
             (self._length, self._direction),
             (bearing, log_length, precision),
         )
@@ -208,7 +210,7 @@ class ArrivalBelief(Searched):
 
 @numba.njit(cache=True, parallel=True)
 def _score(  # type: ignore[no-untyped-def]
-    log_belief, cost, searched, active, kept, position, reach, fields, terms
+    log_belief, cost, searched, active, kept, position, reach, bias, fields, terms
 ):
     length, direction = fields
     bearing, log_length, precision = terms
@@ -227,11 +229,21 @@ def _score(  # type: ignore[no-untyped-def]
                 if cost[n, y, x] == np.inf or searched[n, y, x]:
                     continue
                 total = np.float32(0.0)
+                # sums over the places of 1, error and squared error, weighted by precision
+                weight = first = second = np.float32(0.0)
                 for k in range(slots):
                     if kept[n, k]:
                         units = min(int(length[n, k, y, x]), _LENGTHS - 1)
                         off = logs[units] - log_length[n, k]
-                        least = np.float32(0.5) * off * off * precision[n, k]
+                        most = (
+                            _OUTLIER / math.sqrt(max(precision[n, k], _LEAST_PRECISION)) + 2 * bias
+                        )
+                        off = np.float32(min(max(off, -most), most))
+                        weight += precision[n, k]
+                        first += precision[n, k] * off
+                        second += precision[n, k] * off * off
                         total += bearing[n, k, direction[n, k, y, x]]
-                        total -= min(least, np.float32(_OUTLIER))
-                log_belief[n, y, x] = total
+                # Gaussian errors with a shared part, which is integrated out
+                if bias > 0:
+                    second -= first * first / (weight + np.float32(1.0 / (bias * bias)))
+                log_belief[n, y, x] = total - np.float32(0.5) * second

@@ -72,6 +72,10 @@ class ArrivalModel:
         Share of a uniform distribution in that of the direction, more than 0 and below 1.
     least_sigma : float
         Least standard deviation of the log-length, more than 0 and up to 10.
+    bias : float
+        Standard deviation of an error that the log-lengths of all places share, 0 to 10. Above 0 it
+        is integrated out, so that a source of unknown loudness is placed by how lengths change
+        along the way.
     reach : int
         Length up to which paths are followed, in squares, 1 to 1000.
 
@@ -87,6 +91,7 @@ class ArrivalModel:
     distance_weight: float = 1.0
     blur: float = 0.1
     least_sigma: float = 0.1
+    bias: float = 0.0
     reach: int = 60
 
     def __post_init__(self) -> None:
@@ -98,6 +103,7 @@ class ArrivalModel:
             "distance_weight": (0, 100),
             "blur": (1e-6, 0.999),
             "least_sigma": (1e-3, 10),
+            "bias": (0, 10),
             "reach": (1, 1000),
         }
         for key, (least, most) in limits.items():
