@@ -121,3 +121,30 @@ def test_too_few_starts_name_the_room(protocols: dict[str, Protocol]) -> None:
 def test_keys_tell_episodes_apart(two_rooms: DrawnScene, protocols: dict[str, Protocol]) -> None:
     episodes = exhaustive_episodes(two_rooms, SOUNDS, protocols["var"], seed=0)
     assert len(np.unique(episodes.keys())) == len(episodes)
+
+
+def test_one_sound_keeps_the_starts_and_uses_every_sound_alike(
+    two_rooms: DrawnScene, protocols: dict[str, Protocol]
+) -> None:
+    crossed = frozen_episodes(two_rooms, SOUNDS, protocols["var"], seed=3)
+    single = frozen_episodes(two_rooms, SOUNDS, protocols["var"], seed=3, one_sound=True)
+    first = crossed.sound == 0
+    for field in ("start", "source", "number", "trajectory_index"):
+        assert (getattr(single, field) == getattr(crossed, field)[first]).all()
+    assert sorted(np.bincount(single.sound).tolist()) == [13, 13, 14]
+    again, other = (
+        frozen_episodes(two_rooms, SOUNDS, protocols["var"], seed, one_sound=True).sound
+        for seed in (3, 4)
+    )
+    assert (again == single.sound).all()
+    assert (other != single.sound).any()
+    # what an episode hears does not depend on the other sounds
+    keys = dict(zip(zip(crossed.start, crossed.sound, strict=True), crossed.keys(), strict=True))
+    for start, sound, key in zip(single.start, single.sound, single.keys(), strict=True):
+        assert keys[start, sound] == key
+
+
+def test_more_sounds_than_starts(two_rooms: DrawnScene, protocols: dict[str, Protocol]) -> None:
+    names = [f"sound_{number}" for number in range(100)]
+    single = frozen_episodes(two_rooms, names, protocols["var"], seed=0, one_sound=True)
+    assert len(single) == len(set(single.sound.tolist())) == 40

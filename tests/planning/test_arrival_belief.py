@@ -120,3 +120,40 @@ def test_when_all_was_searched_the_search_begins_again():
 def test_settings_out_of_range_are_refused(key, value):
     with pytest.raises(UserError, match=f"planner.model.{key}"):
         ArrivalModel(**{key: value})
+
+
+def louder(cost, poses, source, model, logs):
+    """Belief where all lengths are heard wrong by one factor, as of a source of another level."""
+    belief = ArrivalBelief(1, SIZE, BINS, model)
+    for pose in poses:
+        bearing, distance = heard(cost, pose, source)
+        belief.hear(np.array([pose]), bearing, distance + np.float32([logs, 0]), ALL)
+    belief.score(cost, ALL)
+    return belief
+
+
+def test_a_shared_error_of_the_lengths_is_integrated_out():
+    # walking past the source: the level rises and falls, and the bearing turns
+    cost, source = np.ones((1, SIZE, SIZE), np.float32), (20, 14)
+    poses = [(x, 20, 1) for x in range(12, 22, 2)]
+    known, unknown = ArrivalModel(kept=1.0), ArrivalModel(kept=1.0, bias=2.0)
+    exact = louder(cost, poses, source, unknown, 0.0).targets(cost, ALL)[0]
+    off = louder(cost, poses, source, unknown, 0.7).targets(cost, ALL)[0]
+    assert np.abs(exact - source).max() <= 1
+    assert np.abs(off - source).max() <= 1
+    absolute = louder(cost, poses, source, known, 0.7)
+    integrated = louder(cost, poses, source, unknown, 0.7)
+    there = (0, source[1], source[0])
+    for belief, most in ((absolute, -4.0), (integrated, 0.0)):
+        lost = belief.log_belief[there] - belief.log_belief.max()
+        assert (lost < most) == (belief is absolute)
+
+
+def test_without_shared_error_it_is_the_sum_over_the_places():
+    # a narrow prior of the shared error is none
+    poses = [(12, 12, 0), (13, 12, 1), (14, 12, 1)]
+    source = (20, 17)
+    none = walk(rooms(), poses, source).log_belief
+    narrow = walk(rooms(), poses, source, ArrivalModel(bias=1e-4)).log_belief
+    there = np.isfinite(none)
+    np.testing.assert_allclose(narrow[there], none[there], atol=0.05)

@@ -1,0 +1,46 @@
+"""Table of conditions: means by hand, intervals, order, and cells that are missing."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_runs import records
+
+from avn.reporting.condition_table import condition_cells, markdown
+
+
+@pytest.fixture
+def episodes():
+    random = np.random.default_rng(0)
+    parts = []
+    for agent in ("belief", "greedy"):
+        for condition, share in (("heard", 0.8), ("unheard", 0.4)):
+            for network in (0, 1, 2):
+                own = records()
+                own["agent"] = agent
+                own["success"] = (random.random(len(own)) < share).astype(int)
+                own["spl"] = 0.5 * own["success"]
+                parts.append(own.assign(condition=condition, train_seed=network))
+    return pd.concat(parts, ignore_index=True)
+
+
+def test_a_cell_is_the_mean_over_scenes_and_networks_of_all_sounds(episodes):
+    cells = condition_cells(episodes).set_index(["agent", "condition"])
+    own = episodes[(episodes["agent"] == "belief") & (episodes["condition"] == "unheard")]
+    by_hand = 100 * own.groupby("scene")["success"].mean().mean()
+    row = cells.loc[("belief", "unheard")]
+    assert row["sr"] == pytest.approx(by_hand)
+    assert row["spl"] == pytest.approx(by_hand / 2)
+    assert row["networks"] == 3
+    assert row["episodes"] == len(own) / 3
+    networks = 100 * own.groupby(["train_seed", "scene"])["success"].mean().groupby(level=0).mean()
+    assert row["sr_network_std"] == pytest.approx(networks.std(ddof=1))
+    if own["scene"].nunique() >= 5:
+        assert row["sr_low"] < row["sr"] < row["sr_high"]
+
+
+def test_the_text_keeps_the_order_and_leaves_missing_cells_empty(episodes):
+    cells = condition_cells(episodes[episodes["agent"] != "greedy"])
+    text = markdown(cells, ["unheard", "heard"], ["greedy", "belief"]).splitlines()
+    assert text[0] == "| condition | `greedy` | `belief` |"
+    assert [line.split("|")[1].strip() for line in text[2:]] == ["`unheard`", "`heard`"]
+    assert all(line.split("|")[2].strip() == "" for line in text[2:])
