@@ -45,7 +45,7 @@ def test_a_run_hears_one_sound_an_episode_and_is_the_same_twice(command, outputs
     arguments = (ROW, *fitting(ROW, *SMALL), f"episodes={ONE_SOUND}", f"outputs={outputs}")
     runs = []
     for force in ("false", "true"):
-        code, out, err = command("eval", *arguments, f"force={force}")
+        code, _, err = command("eval", *arguments, f"force={force}")
         assert code == 0, err
         cfg = composed(*arguments)
         runs.append((Evaluation(cfg).folder / "episodes.csv").read_bytes())

@@ -35,8 +35,8 @@ def condition_cells(episodes: pd.DataFrame) -> pd.DataFrame:
     for condition, own in episodes.groupby(CONDITION, sort=False):
         # the sounds are pooled: an episode has one of many
         found = across_runs(own.drop(columns=CONDITION).assign(sound=ALL_SOUNDS))
-        found = found[found["scene"] == (AVERAGE if AVERAGE in set(found["scene"]) else "")]
-        rows.append(found.assign(**{CONDITION: condition}))
+        average = found[found["scene"] == AVERAGE]
+        rows.append(average.assign(**{CONDITION: condition}))
     cells = pd.concat(rows, ignore_index=True)
     cells["episodes"] //= cells["networks"]
     cells[list(_PERCENT)] *= 100.0
