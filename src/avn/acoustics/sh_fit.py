@@ -66,7 +66,7 @@ def fit_sh_hrirs(measured: MeasuredHrirs, name: str = "acoustics.head") -> ShHri
     size = fft.next_fast_len(max(2 * measured.responses.shape[-1], rate // 20), real=True)
     harmonics = sh(measured.directions) * _N3D
     gram = harmonics.T @ (weights[:, None] * harmonics) + _RIDGE * np.eye(CHANNELS)
-    solver: NDArray[np.float64] = np.linalg.solve(gram, (weights[:, None] * harmonics).T)
+    solver = np.asarray(np.linalg.solve(gram, harmonics.T * weights), dtype=np.float64)
     # about the head's centre, where the phase changes least with frequency
     centre = _advance(_delay(measured.responses, weights, size, rate), size)
     spectra = [fft.rfft(measured.responses[:, ear], size) * centre for ear in (0, 1)]

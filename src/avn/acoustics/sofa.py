@@ -112,9 +112,7 @@ def _delayed(responses: NDArray[np.float64], delay: Any) -> NDArray[np.float64]:
     """Delay responses by what a file states apart from them, in samples, (1 or M, 2)."""
     from scipy import fft
 
-    delays = np.broadcast_to(np.atleast_2d(np.asarray(delay, dtype=np.float64)), (1, 2))
-    if np.asarray(delay).size > 2:
-        delays = np.asarray(delay, dtype=np.float64).reshape(len(responses), 2)
+    delays = np.broadcast_to(np.reshape(delay, (-1, 2)), responses.shape[:2])
     if not delays.any():
         return responses
     delays = delays - delays.min()  # what all have in common tells nothing
