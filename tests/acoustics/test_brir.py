@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from avn.acoustics import materials
+from avn.acoustics.ambisonics import sh
 from avn.acoustics.band_filters import band_firs, band_weights, half_length, minimum_phase
 from avn.acoustics.brir import (
     AcousticsConfig,
@@ -278,6 +279,22 @@ def test_the_hash_of_the_tables_follows_what_they_hold(monkeypatch: pytest.Monke
     louder = materials.absorption(materials.NAMES) * 0.99
     monkeypatch.setattr(materials, "absorption", lambda names: louder)
     assert assets_hash() != before
+
+
+def test_direct_sound_and_reverberation_are_heard_by_the_head_of_the_config() -> None:
+    source, receiver = np.array([3.0, 0.0, 1.5]), np.array([[0.0, 0.0, 1.5]])
+    kemar = dataclasses.replace(CONFIG, head="kemar", air=False)
+    direct = render_direct_paths(np.zeros((0, 4)), source, receiver, kemar)
+    heard = direct.samples[0, 0] * direct.scale[0]
+    filters = head_filters(kemar.rate, "kemar")[0].astype(np.float64)
+    wanted = np.einsum("ect,c->et", filters, sh([1.0, 0.0, 0.0])) / (np.sqrt(4 * np.pi) * 3)
+    np.testing.assert_allclose(heard[:, : wanted.shape[1]], wanted, atol=1e-4 * abs(wanted).max())
+    late = [
+        render_source(shoebox(ROOM, "plaster"), SOURCE, np.array([[2.0, 2.0, 1.5]]), config)
+        for config in (dataclasses.replace(CONFIG, air=False), kemar)
+    ]
+    assert late[0].samples.shape == late[1].samples.shape
+    assert not np.array_equal(late[0].samples, late[1].samples)
 
 
 @pytest.mark.parametrize("rate", [8000, 48000])

@@ -65,7 +65,7 @@ def test_time_and_level_differences_are_those_of_the_hrirs(
     hrirs = load_sh_hrirs()
     mirrored = np.stack([around(side * degrees, 1.0), around(-side * degrees, 1.0)])
     weights = sh(mirrored * [1, 1, 0])
-    wanted_time, wanted_level = cues(weights @ hrirs.left, hrirs.rate)
+    wanted_time, wanted_level = cues(weights @ hrirs.ears[0], hrirs.rate)
     assert time == pytest.approx(wanted_time, rel=0.1, abs=5)
     assert level == pytest.approx(wanted_level, rel=0.1, abs=0.1)
     if degrees == 0:

@@ -109,6 +109,11 @@ def test_the_world_is_named_with_what_was_changed(tmp_path):
         "agent=greedy", "acoustics=diffraction", "+acoustics@training.acoustics=resonance"
     )
     assert "acoustics diffraction (networks trained in resonance)" in other
+    heads = ("agent=greedy", "acoustics.head=kemar")
+    assert world(*heads).startswith("acoustics resonance with head=kemar; ")
+    assert world(*heads, "+acoustics@training.acoustics=resonance").startswith(
+        "acoustics resonance with head=kemar (networks trained in resonance with head=ku100); "
+    )
     assert "training" not in world("agent=random_walk")  # it has no network
 
 

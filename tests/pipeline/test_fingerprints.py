@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from ears import write_head
 from omegaconf import OmegaConf
 from small import composed
 
@@ -13,7 +14,7 @@ from avn.config.folder import conf_folder
 from avn.core.errors import UserError
 from avn.navigation.protocols import GOAL_MEANINGS
 from avn.pipeline.agent import build_agent
-from avn.pipeline.apartments import TRAINING, Apartments
+from avn.pipeline.apartments import TEST, TRAINING, Apartments
 from avn.pipeline.occupancy import LocalPatches, OccupancyNetwork
 from avn.pipeline.policy import Policy
 from avn.pipeline.run import Evaluation
@@ -122,6 +123,8 @@ def test_how_an_agent_acts_is_no_part_of_what_it_learnt(override, wanted):
         # the regimes share the reverberation
         ("acoustics=diffraction", {*DIRECT, "run_windows", "policy_map"}),
         ("acoustics.rays=500", {*SOUNDING, "run_windows", "policy_map"}),
+        ("acoustics.head=ku100", NONE),
+        ("acoustics.head=kemar", {*SOUNDING, "run_windows", "policy_map"}),
         ("acoustics.receiver_height=1.4", {*SOUNDING, "geometry", "run_windows", "policy_map"}),
         ("split.folder=var", EVERY),
     ],
@@ -140,6 +143,7 @@ def test_a_setting_makes_anew_what_it_changes(override, wanted):
         "microphone.noise_rms=0.02",
         "split=elsewhere",
         "acoustics=diffraction",
+        "acoustics.head=kemar",
         "seed=3",
     ],
 )
@@ -150,6 +154,38 @@ def test_no_change_of_the_test_world_makes_a_network_anew(kind, override, tmp_pa
     before, after = composed(*row), composed(*row, *_apartments(override, tmp_path))
     assert kind(before).fingerprint == kind(after).fingerprint
     assert not any(key.startswith(("sound.", "microphone.")) for key in kind(after).read())
+
+
+def test_the_default_head_is_in_no_settings_of_a_fingerprint():
+    """So that users' products of before there were other heads are found."""
+    cfg = composed(*MINI)
+    for kind in (Geometry, LateReverberation, DirectSound):
+        stage = kind(cfg, Apartments(cfg, "test"))
+        assert "head" not in str(stage.inputs())
+        assert ("acoustics.head" in stage.read_here()) == (kind is not Geometry)
+
+
+def test_a_file_of_a_head_counts_by_its_content(tmp_path):
+    paths = [tmp_path / name for name in ("a.sofa", "b.sofa", "c.sofa")]
+    for path, count in zip(paths, (40, 40, 50), strict=True):
+        write_head(path, count)
+    for kind in (LateReverberation, DirectSound):
+        one, same, other = (
+            kind(cfg, Apartments(cfg, "test")).fingerprint
+            for cfg in (composed(*MINI, f"acoustics.head={path}") for path in paths)
+        )
+        assert one == same != other
+
+
+def test_each_world_has_its_own_head():
+    own = ("acoustics.head=kemar", "+acoustics@training.acoustics=resonance")
+    cfg, usual = composed(*MINI, *own), composed(*MINI)
+    assert (cfg.acoustics.head, cfg.training.acoustics.head) == ("kemar", "ku100")
+    test, training = (Apartments(cfg, "train", world) for world in (TEST, TRAINING))
+    before = Apartments(usual, "train")
+    for kind in (LateReverberation, DirectSound):
+        assert kind(cfg, training).paths == kind(usual, before).paths
+        assert not {*kind(cfg, test).paths} & {*kind(usual, before).paths}
 
 
 def _apartments(override, folder):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from avn.acoustics import materials
 from avn.acoustics.direct_path import LOSS_SECONDS, REGIMES, DirectPaths, find_paths, render_paths
-from avn.acoustics.hrtf import load_sh_hrirs
+from avn.acoustics.heads import DEFAULT, head_content, head_filters, load_head
 from avn.acoustics.rendering import Binaural, binaural_responses
 from avn.acoustics.settings import AcousticsConfig
 from avn.acoustics.tracer import Events, trace
@@ -37,7 +37,8 @@ def check_config(config: AcousticsConfig, node: str = "acoustics") -> AcousticsC
     Raises
     ------
     UserError
-        If a value is out of range; the message names the key below `node` and the valid values.
+        If a value is out of range or there is no such head; the message names the key below `node`
+        and the valid values.
     """
     if config.direct_path not in REGIMES:
         raise UserError(
@@ -62,6 +63,7 @@ def check_config(config: AcousticsConfig, node: str = "acoustics") -> AcousticsC
         value = getattr(config, key)
         if not low <= value <= high:
             raise UserError(f"{node}.{key}: {value} is out of range; use {low:g} to {high:g}")
+    load_head(config.head, f"{node}.head")
     return config
 
 
@@ -86,22 +88,30 @@ class Reverberation:
 
 
 @lru_cache(maxsize=4)
-def head_filters(rate: int) -> NDArray[np.float32]:
-    """Return the binaural filters of the packaged HRIRs, (4, 2, 16, taps), cached by rate."""
-    return load_sh_hrirs().filters(rate)
+def _binaural(rate: int, samples: int, head: str) -> Binaural:
+    return Binaural.prepare(head_filters(rate, head), samples, rate)
 
 
-@lru_cache(maxsize=4)
-def _binaural(rate: int, samples: int) -> Binaural:
-    return Binaural.prepare(head_filters(rate), samples, rate)
+def assets_hash(head: str = DEFAULT, key: str = "acoustics.head") -> str:
+    """Compute a hash of the tables that responses depend on: materials and HRIRs.
 
+    Parameters
+    ----------
+    head : str
+        The setting `head` of `AcousticsConfig`; a file enters by its content.
+    key : str
+        Key of the setting, for messages.
 
-def assets_hash() -> str:
-    """Compute a hash of the tables that responses depend on: materials and HRIRs."""
+    Raises
+    ------
+    UserError
+        If there is no such head.
+    """
     tables = (materials.absorption(materials.NAMES), materials.scattering(materials.NAMES))
     content = hashlib.sha256(repr(materials.NAMES).encode())
-    for table in (*tables, load_sh_hrirs().left):
+    for table in tables:
         content.update(np.ascontiguousarray(table).tobytes())
+    content.update(head_content(head, key))
     return content.hexdigest()
 
 
@@ -157,7 +167,7 @@ def render_source(
         scattering=scattering,
         air=config.air,
     )
-    binaural = _binaural(config.rate, round(config.seconds * config.rate))
+    binaural = _binaural(config.rate, round(config.seconds * config.rate), config.head)
     samples, scale = binaural_responses(events, binaural, config.rate)
     return Reverberation(samples, scale, cut_off_energy(events))
 
@@ -181,7 +191,8 @@ def render_direct_paths(
     # One length for all sources of a regime, with or without diffracted paths.
     attenuated = config.air or config.direct_path == "diffraction"
     loss_taps = round(LOSS_SECONDS * config.rate) if attenuated else 1
-    return render_paths(paths, head_filters(config.rate), config.rate, loss_taps, config.air)
+    filters = head_filters(config.rate, config.head)
+    return render_paths(paths, filters, config.rate, loss_taps, config.air)
 
 
 def combine(reverberation: Reverberation, direct_path: DirectPaths) -> NDArray[np.float32]:

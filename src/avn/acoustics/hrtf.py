@@ -1,8 +1,9 @@
-"""Measured head-related impulse responses, as filters of third-order ambisonic channels.
+"""Head-related impulse responses as filters of third-order ambisonic channels.
 
-The set is that of Omnitone 1.3.0 (Apache-2.0), made from the SADIE measurements of a KU 100 dummy
-head; credit and licence are beside it in ``assets/hrirs``. The head is assumed symmetric: the set
-holds the left ear, and the right ear is its mirror image.
+The set of the package's default head is that of Omnitone 1.3.0 (Apache-2.0), made from the SADIE
+measurements of a KU 100 dummy head; credit and licence are beside it in ``assets/hrirs``. That head
+is assumed symmetric: the file holds the left ear, and the right ear is its mirror image.
+`avn.acoustics.heads` has the other heads.
 """
 
 from dataclasses import dataclass
@@ -24,18 +25,18 @@ LEVEL_RATE = 16000
 
 @dataclass(frozen=True)
 class ShHrirs:
-    """Spherical-harmonic HRIRs of the left ear.
+    """Spherical-harmonic HRIRs of both ears.
 
     Attributes
     ----------
-    left : array, shape (16, taps)
-        Impulse responses, to be convolved with the ambisonic channels (ACN, SN3D) in the frame of
-        the head and summed. int16 full scale is 1.
+    ears : array, shape (2, 16, taps)
+        Impulse responses of the left and the right ear, to be convolved with the ambisonic channels
+        (ACN, SN3D) in the frame of the head and summed. Only `filters` sets their level.
     rate : int
         Sampling rate in Hz.
     """
 
-    left: NDArray[np.float64]
+    ears: NDArray[np.float64]
     rate: int
 
     def filters(self, rate: int = 16000) -> NDArray[np.float32]:
@@ -77,13 +78,17 @@ class ShHrirs:
         up, down = rate // common, self.rate // common
         # `resample_poly` keeps the amplitude of an impulse response; to keep the spectrum, the
         # taps, `down / up` times fewer, are multiplied by that ratio.
-        left = resample_poly(self.left, up, down, axis=1) * (down / up)
-        return np.stack([left, np.where(DEGREES[:, None] < 0, -left, left)])
+        return np.asarray(resample_poly(self.ears, up, down, axis=2)) * (down / up)
+
+
+def mirrored(left: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return both ears (2, 16, taps) of a symmetric head from its left ear, (16, taps)."""
+    return np.stack([left, np.where(DEGREES[:, None] < 0, -left, left)])
 
 
 @lru_cache(maxsize=1)
 def load_sh_hrirs() -> ShHrirs:
-    """Load the SH-HRIRs of the package.
+    """Load the SH-HRIRs of the KU 100.
 
     Returns
     -------
@@ -95,6 +100,6 @@ def load_sh_hrirs() -> ShHrirs:
         samples, rate = soundfile.read(path, dtype="float64", always_2d=True)
     if samples.shape[1] != CHANNELS:
         raise RuntimeError(f"the HRIR asset has {samples.shape[1]} channels, not {CHANNELS}")
-    left = np.ascontiguousarray(samples.T)
-    left.setflags(write=False)
-    return ShHrirs(left=left, rate=int(rate))
+    ears = mirrored(np.ascontiguousarray(samples.T))
+    ears.setflags(write=False)
+    return ShHrirs(ears=ears, rate=int(rate))

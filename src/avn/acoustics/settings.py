@@ -27,6 +27,9 @@ class AcousticsConfig:
         Radius of the spheres that receive rays, metres.
     receiver_height, source_height : float
         Metres above the floor.
+    head : str
+        Head of the listener: `ku100`, `kemar` or the path of a SOFA file of measured head-related
+        impulse responses.
     air : bool
         True for absorption by air, of reflections and of the direct sound.
     seed : int
@@ -42,5 +45,6 @@ class AcousticsConfig:
     receiver_radius: float = 0.25
     receiver_height: float = 1.5
     source_height: float = 1.0
+    head: str = "ku100"
     air: bool = True
     seed: int = 0

@@ -77,8 +77,8 @@ class AudioNetwork(Network):
     batch : int
         Clips in a batch, 1 or more; read by the data module.
     flip_augmentation : bool
-        Whether each training clip is mirrored with probability 0.5: ears and target. This is exact,
-        as the head and the physics are symmetric.
+        Whether each training clip is mirrored with probability 0.5: ears and target. This is exact
+        where the head is symmetric, as those of the package are.
     flip_tta : bool
         Test-time augmentation: whether an estimate is the mean over a clip and its mirror image.
     train_seed : int

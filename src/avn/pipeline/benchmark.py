@@ -117,11 +117,13 @@ def describe_world(cfg: DictConfig, default: DictConfig) -> str:
         As for `changed_settings`.
     """
     changed = changed_settings(cfg, default)
-    training = OmegaConf.select(cfg, f"{TRAINING.acoustics}.name")
+    training = OmegaConf.select(cfg, TRAINING.acoustics)
     reads_training = any(key.startswith(f"{TRAINING.acoustics}.") for key in Evaluation(cfg).read())
     acoustics = _named(cfg, "acoustics", changed)
-    if reads_training and training != cfg.acoustics.name:
-        acoustics += f" (networks trained in {training})"
+    own, other = ((node.name, node.head) for node in (training, cfg.acoustics))
+    if reads_training and own != other:
+        head = f" with head={training.head}" if training.head != cfg.acoustics.head else ""
+        acoustics += f" (networks trained in {training.name}{head})"
     parts = [acoustics, _named(cfg, "protocol", changed), sounds_text(*_sounds(cfg))]
     if microphone := _changes("microphone", changed):
         parts.append(f"microphone with {microphone}")

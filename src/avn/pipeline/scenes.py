@@ -24,6 +24,8 @@ from avn.pipeline.apartments import (
 
 # Settings of an acoustic regime; the others change the reverberation, which regimes share.
 _REGIME = ("name", "direct_path")
+# The fingerprints hold what it refers to, so that a default run finds products of before it.
+_HEAD = ("head",)
 _HEIGHTS = ("receiver_height", "source_height")
 
 
@@ -102,12 +104,17 @@ class LateReverberation(_Acoustic):
         return (self.apartments.world.acoustics,)
 
     def ignored(self) -> Sequence[str]:
-        """Return the keys of the acoustic regime."""
-        return _keys(self.apartments, _REGIME)
+        """Return the keys of the acoustic regime and of the head."""
+        return _keys(self.apartments, (*_REGIME, *_HEAD))
+
+    def consulted(self) -> Sequence[str]:
+        """Return the keys of the split and of the head; `content` holds the head's responses."""
+        return (*super().consulted(), *_keys(self.apartments, _HEAD))
 
     def content(self) -> Any:
         """Return the hash of the tables of materials and head-related impulse responses."""
-        return brir.assets_hash()
+        (key,) = _keys(self.apartments, _HEAD)
+        return brir.assets_hash(self.apartments.node("acoustics").head, key)
 
     @property
     def title(self) -> str:
@@ -136,13 +143,17 @@ class DirectSound(_Acoustic):
     version = 2  # air absorbs the direct sound
 
     def needs(self) -> Sequence[Any]:
-        """Return the stages of geometry and late reverberation."""
+        """Return the stages of geometry and late reverberation, whose fingerprint has the head."""
         arguments = (self.cfg, self.apartments)
         return (Geometry(*arguments), LateReverberation(*arguments))
 
     def settings(self) -> Sequence[str]:
         """Return the keys of the acoustic regime, and of absorption by air."""
         return _keys(self.apartments, (*_REGIME, "air"))
+
+    def consulted(self) -> Sequence[str]:
+        """Return the keys of the split and of the head, which enters by the reverberation."""
+        return (*super().consulted(), *_keys(self.apartments, _HEAD))
 
     @property
     def title(self) -> str:
