@@ -12,10 +12,16 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from avn.core.clip_id import ClipId
+from avn.core.prefetch import prefetch, threads_for_one_operation
 from avn.pipeline.audio_inference import AudioInference
-from avn.pipeline.rendered_audio import Waveforms
+from avn.pipeline.rendered_audio import RenderedClips, Waveforms
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.stage import Stage
+
+# Clips computed at once, for the caches of a CPU.
+_BATCH = 32
+_STATES = 1 << 24  # more than an apartment has
 
 
 class LiveInference(Waveforms):
@@ -50,6 +56,11 @@ class LiveInference(Waveforms):
         """Title of the product, for messages."""
         return self._table.title
 
+    @property
+    def clips_class(self) -> type[RenderedClips]:
+        """Class of the renderer of an apartment."""
+        return RememberedClips
+
     def check(self) -> None:
         """Refuse what the table refuses."""
         self._table.check()
@@ -65,3 +76,45 @@ class LiveInference(Waveforms):
             return forward(clips.to(model.device)).cpu().float()
 
         return outputs, tuple(outputs(torch.zeros(1, 2, self._rate)).shape[1:])
+
+
+class RememberedClips(RenderedClips):
+    """Renderer that computes each clip once, as agents that go in circles hear the same again."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        # keys of the clips that were heard, in order, and their outputs
+        self._keys = torch.empty(0, dtype=torch.int64)
+        self._outputs = torch.empty(0, *self.shape)
+
+    def __call__(self, clip: ClipId) -> Tensor:
+        """Return the outputs of N clips, (N, ...) float32."""
+        keys = self._key(clip)
+        known = torch.isin(keys, self._keys)
+        if not known.all():
+            new, first = _first_of_each(keys[~known])
+            rows = (~known).nonzero()[:, 0][first]
+            heard = self._computed(ClipId(*(part[rows] for part in clip)))
+            order = torch.cat((self._keys, new)).argsort()
+            self._keys = torch.cat((self._keys, new))[order]
+            self._outputs = torch.cat((self._outputs, heard))[order]
+        return self._outputs[torch.searchsorted(self._keys, keys)]
+
+    def _key(self, clip: ClipId) -> Tensor:
+        pair = clip.source * _STATES + clip.state
+        return (pair * self.sounds + clip.sound) * self.realisations + clip.realisation
+
+    def _computed(self, clip: ClipId) -> Tensor:
+        parts = [ClipId(*parts) for parts in zip(*(p.split(_BATCH) for p in clip), strict=True)]
+        threads = torch.get_num_threads()
+        with threads_for_one_operation(1):
+            if len(parts) == 1:
+                return self._rendered(parts[0])
+            return torch.cat([*prefetch(self._rendered, parts, threads)])
+
+
+def _first_of_each(keys: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the different keys in order, and the index at which each is first."""
+    found, inverse = keys.unique(return_inverse=True)
+    first = torch.full_like(found, len(keys))
+    return found, first.scatter_reduce(0, inverse, torch.arange(len(keys)), "amin")

@@ -45,6 +45,11 @@ class Waveforms(Stage):
 
     kind = "hear/waveforms"
 
+    @property
+    def clips_class(self) -> type[RenderedClips]:
+        """Class of the renderer of an apartment."""
+        return RenderedClips
+
     def __init__(self, cfg: DictConfig, apartments: Apartments, clips: Clips) -> None:
         super().__init__(cfg)
         self.apartments, self.clips = apartments, clips
@@ -104,7 +109,7 @@ class Waveforms(Stage):
         realisations = int(OmegaConf.select(self.cfg, self.clips.realisations))
         output, shape = self.output()
         return [
-            RenderedClips(scene, renderer, realisations, output, shape)
+            self.clips_class(scene, renderer, realisations, output, shape)
             for scene in self.needs()[0].load()
         ]
 
