@@ -12,6 +12,7 @@ from torch import Tensor
 
 from avn.agents.planner_agent import PlannerAgent
 from avn.apartments.floor_plan import CELL
+from avn.core.actions import ROTATE_RIGHT, STOP
 from avn.core.errors import UserError
 from avn.core.heard import Arrivals
 from avn.mapping.base import Mapper
@@ -41,6 +42,8 @@ class BeliefAgent(PlannerAgent):
         Probability from which it stops by "belief", more than 0 and up to 1.
     stop_at : float
         Probability from which it stops by "classifier", 0 to 1.
+    confirm : bool
+        Whether it turns until it has heard all four headings of a square before it stops there.
     **planner
         Other parameters of `PlannerAgent`, without those of its source filter.
     """
@@ -52,6 +55,7 @@ class BeliefAgent(PlannerAgent):
         stop_by: str = "belief",
         stop_above: float = 0.5,
         stop_at: float = 0.5,
+        confirm: bool = True,
         **planner: Any,
     ) -> None:
         super().__init__(mapper, stop_at=stop_at, **planner)
@@ -60,6 +64,7 @@ class BeliefAgent(PlannerAgent):
         if not 0 < stop_above <= 1:
             raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and up to 1")
         self.model, self.stop_by, self.stop_above = model or ArrivalModel(), stop_by, stop_above
+        self.confirm = confirm
         self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
@@ -70,7 +75,7 @@ class BeliefAgent(PlannerAgent):
     def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
         """Return the settings of the source filter, and those of Stop that do not count."""
         classified = protocol.requires_stop and self.stop_by == "classifier"
-        stop = () if protocol.requires_stop else ("stop_by",)
+        stop = () if protocol.requires_stop else ("stop_by", "confirm")
         above = ("stop_above",) if classified or not protocol.requires_stop else ()
         return ("source_filter", "error", *stop, *above)
 
@@ -95,6 +100,15 @@ class BeliefAgent(PlannerAgent):
     def _targets(self, active: np.ndarray) -> np.ndarray:
         assert self._belief is not None
         return self._belief.targets(self.mapper.graph.cost, active)
+
+    def _with_stops(self, observation: TensorDict, actions: Tensor) -> Tensor:
+        stops = self._stops(observation)
+        if self.confirm:
+            assert self._belief is not None
+            heard = torch.from_numpy(self._belief.heard_around())
+            actions = torch.where(stops, ROTATE_RIGHT, actions)
+            stops &= heard
+        return torch.where(stops, STOP, actions)
 
     def _stops(self, observation: TensorDict) -> Tensor:
         if self.stop_by == "classifier":

@@ -166,12 +166,16 @@ class PlannerAgent(Agent):
             spins = self._turns >= 2 * self.max_rotations + HEADINGS
         actions = torch.where(spins, FORWARD, actions)
         if self.protocol.requires_stop:
-            actions = torch.where(self._stops(observation), STOP, actions)
+            actions = self._with_stops(observation, actions)
         self._direction = torch.where(
             actions == FORWARD, 0, torch.where(actions == BACKWARD, 2, -1)
         )
         self._turns = torch.where(self._direction >= 0, 0, self._turns + 1)
         return actions
+
+    def _with_stops(self, observation: TensorDict, actions: Tensor) -> Tensor:
+        """Return the actions, with Stop where an agent stops; for protocols with Stop."""
+        return torch.where(self._stops(observation), STOP, actions)
 
     def _stops(self, observation: TensorDict) -> Tensor:
         """Return which agents stop, (N,) bool; for protocols with Stop."""

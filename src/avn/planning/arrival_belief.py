@@ -188,6 +188,12 @@ class ArrivalBelief(Searched):
             best[none] = flat[none].argmax(1)
         return np.stack((best % cost.shape[1], best // cost.shape[1]), 1)
 
+    def heard_around(self) -> NDArray[np.bool_]:
+        """Return whether each agent has heard all four headings where it is, (N,)."""
+        count = self._count[np.arange(len(self._newest)), self._newest]
+        around: NDArray[np.bool_] = (count > 0).all(1)
+        return around
+
     def near(self, position: NDArray[np.int64], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the probability that the source is at some offsets from each agent, (N,).
 
