@@ -191,8 +191,7 @@ class ArrivalBelief(Searched):
     def heard_around(self) -> NDArray[np.bool_]:
         """Return whether each agent has heard all four headings where it is, (N,)."""
         count = self._count[np.arange(len(self._newest)), self._newest]
-        around: NDArray[np.bool_] = (count > 0).all(1)
-        return around
+        return np.asarray((count > 0).all(1))
 
     def near(self, position: NDArray[np.int64], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the probability that the source is at some offsets from each agent, (N,).
