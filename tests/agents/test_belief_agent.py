@@ -95,6 +95,22 @@ def test_the_classifier_can_decide_to_stop():
     assert run(agent, STOP)["success"].mean() > 0.97
 
 
+def test_it_hears_all_headings_before_it_stops():
+    # one heading in four always claims that the source is here
+    scene = draw("flat", FLAT)
+    arrival = heard(scene)
+    arrival[:, ::4, ..., BINS] = math.log(0.25)
+    outcomes = []
+    for confirm in (False, True):
+        agent = BeliefAgent(OccupancyMapper(SIZE), confirm=confirm, obstacle_threshold=0.01)
+        frame = run(agent, STOP, arrival)
+        outcomes.append((frame["outcome"] == "stopped_elsewhere").mean())
+        turns = frame["actions"] - frame["path_length"] / 0.5
+        if confirm:
+            assert turns[frame["success"] == 1].min() >= 4, "three turns and Stop"
+    assert outcomes[1] < 0.5 * outcomes[0]
+
+
 def test_equal_runs_have_equal_records():
     frames = [
         run(BeliefAgent(OccupancyMapper(SIZE), obstacle_threshold=0.01), STOP) for _ in range(2)
@@ -105,7 +121,8 @@ def test_equal_runs_have_equal_records():
 def test_settings_without_effect_are_named():
     agent = BeliefAgent(OccupancyMapper(SIZE))
     assert {"source_filter", "error", "stop_by"} <= set(agent.unused_settings(VAR))
-    assert "stop_by" not in agent.unused_settings(STOP)
+    assert {"confirm", "stop_above"} <= set(agent.unused_settings(VAR))
+    assert not {"stop_by", "confirm"} & set(agent.unused_settings(STOP))
     other = BeliefAgent(OccupancyMapper(SIZE), stop_by="classifier")
     assert "stop_above" in other.unused_settings(STOP)
     assert dataclasses.asdict(agent.model) == dataclasses.asdict(ArrivalModel())
