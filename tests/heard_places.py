@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import torch
 from small_places import FLAT
+from tensordict import TensorDict
 from torch import Tensor
 
 from avn.agents.planner_agent import PlannerAgent
@@ -64,3 +65,31 @@ def run(
     observations = SceneObservations(audio, seen)
     labels = Labels("an agent", "diffraction")
     return rollout_scene(agent, scene, episodes, protocol, labels, observations)
+
+
+def arrival(degrees, metres=5.0, sigma=0.1):
+    """What is heard from some directions, clockwise from the front, (N, B + 6)."""
+    values = torch.zeros(len(degrees), BINS + 6)
+    values[:, :BINS] = -9.0
+    bins = (torch.as_tensor(degrees) / 360 * BINS).round().long() % BINS
+    values[torch.arange(len(degrees)), bins] = 0.0
+    values[:, BINS], values[:, BINS + 1] = math.log(metres), sigma
+    return values
+
+
+def observation(heard, pose, patch=0.9):
+    n = len(heard)
+    return TensorDict(
+        {
+            "arrival": heard,
+            "odometry": torch.tensor(pose).expand(n, 3).clone(),
+            "collided": torch.zeros(n, dtype=torch.bool),
+            "local_patch": torch.full((n, 5, 5), patch),
+        },
+        batch_size=[n],
+    )
+
+
+def first_action(agent, protocol, heard, pose=(0, 0, 0)):
+    agent.reset(len(heard), torch.Generator(), protocol)
+    return agent.act(observation(heard, pose))

@@ -1,13 +1,10 @@
 """Agents that walk in the heard direction, with exact senses and with made-up ones."""
 
-import math
-
 import numpy as np
 import pytest
 import torch
-from heard_places import BINS, SIZE, heard, run
+from heard_places import BINS, SIZE, arrival, first_action, heard, observation, run
 from small_places import FLAT, STOP, VAR
-from tensordict import TensorDict
 
 from avn.agents.direction_follower import DirectionFollower
 from avn.core.actions import FORWARD, ROTATE_LEFT, ROTATE_RIGHT
@@ -21,34 +18,6 @@ HALL = "\n".join(["a" * 15] * 7 + ["a" * 7 + "A" + "a" * 7] + ["a" * 15] * 7)
 
 def follower(**settings):
     return DirectionFollower(OccupancyMapper(SIZE), obstacle_threshold=0.01, **settings)
-
-
-def arrival(degrees, metres=5.0, sigma=0.1):
-    """What is heard from some directions, clockwise from the front, (N, B + 6)."""
-    values = torch.zeros(len(degrees), BINS + 6)
-    values[:, :BINS] = -9.0
-    bins = (torch.as_tensor(degrees) / 360 * BINS).round().long() % BINS
-    values[torch.arange(len(degrees)), bins] = 0.0
-    values[:, BINS], values[:, BINS + 1] = math.log(metres), sigma
-    return values
-
-
-def observation(heard, pose, patch=0.9):
-    n = len(heard)
-    return TensorDict(
-        {
-            "arrival": heard,
-            "odometry": torch.tensor(pose).expand(n, 3).clone(),
-            "collided": torch.zeros(n, dtype=torch.bool),
-            "local_patch": torch.full((n, 5, 5), patch),
-        },
-        batch_size=[n],
-    )
-
-
-def first_action(agent, protocol, heard, pose=(0, 0, 0)):
-    agent.reset(len(heard), torch.Generator(), protocol)
-    return agent.act(observation(heard, pose))
 
 
 @pytest.mark.parametrize("heading", range(4))
