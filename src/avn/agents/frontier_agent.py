@@ -32,7 +32,9 @@ class FrontierAgent(HearingAgent):
         Builds the map and localises the agent; one with a map of squares.
     sector : float
         Step in which the angle between a frontier and the heard direction counts, degrees, more
-        than 0 and up to 180; of frontiers of one step, the one of the fewest moves is chosen.
+        than 0 and up to 180; of frontiers of one step, the one of the fewest moves is chosen. With
+        90, that is the nearest within 90 degrees of the direction, which was best on validation
+        apartments, by two points of success over 10.
     sight_above : float
         Probability above which the source is taken to be in sight, 0 to 1; 1 for never.
     **hearing
@@ -45,7 +47,7 @@ class FrontierAgent(HearingAgent):
     """
 
     def __init__(
-        self, mapper: Mapper, sector: float = 10.0, sight_above: float = 0.5, **hearing: Any
+        self, mapper: Mapper, sector: float = 90.0, sight_above: float = 0.5, **hearing: Any
     ) -> None:
         super().__init__(mapper, **hearing)
         if not 0 < sector <= 180:
