@@ -59,6 +59,45 @@ def test_exact_arrivals_are_an_oracle_input(command, outputs):
     assert "arrival" in err[-1]
 
 
+@pytest.mark.parametrize("row", ["direction_follower", "frontier", "srp_phat"])
+def test_simple_rows_follow_how_the_sound_arrives(command, outputs, row):
+    code, out, err = ours(command, outputs, f"agent={row}", "protocol=stop")
+    assert code == 0, err
+    assert set(records(out)["agent"]) == {row}
+
+
+def test_a_sound_model_without_weights_estimates_places_too(command, outputs):
+    code, out, err = ours(command, outputs, "agent=greedy", "sound_model=srp_phat")
+    assert code == 0, err
+    errors = pd.read_csv(Path(out[-1]) / "source_estimates.csv")
+    assert (errors["error_m"] > 0).all()
+
+
+def test_a_stop_classifier_that_is_not_asked_is_not_trained(command, outputs):
+    given = ("agent=direction_follower", "stop_model=cnn5", "protocol=stop")
+    settings = fitting(given, *WORLD, *EYES)
+    code, _, err = command("eval", *settings, f"outputs={outputs}", *given)
+    assert code == 2
+    assert err[-1].startswith("avn.eval: stop_model")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("train", ("model=sound_cnn",), "'srp_phat' has no weights, so there is nothing to train"),
+        ("eval", ("agent=a3c_va",), "no embedding; choose a network, such as cnn5"),
+        ("eval", ("agent=srp_phat", "sound_model.temperature=0"), "sound_model.temperature: 0"),
+        ("eval", ("agent=srp_phat", "acoustics.rate=8000"), "up to 4000, half the sampling rate"),
+        ("eval", ("agent=srp_phat", "sound_model.ckpt_path=x"), "sound_model.ckpt_path: not read"),
+    ],
+)
+def test_what_a_model_without_weights_cannot_do_is_one_line(command, tmp_path, name, options, said):
+    code, _, err = command(name, f"outputs={tmp_path}", *options, "sound_model=srp_phat")
+    assert code == 2
+    assert said in err[-1]
+    assert "Traceback" not in "".join(err)
+
+
 @pytest.mark.parametrize("row", ["ours_noexp", "ours_exp"])
 def test_the_rows_of_the_paper_walk_and_say_stop(command, outputs, row):
     code, out, err = ours(command, outputs, f"agent={row}", "protocol=var_stop")
@@ -143,6 +182,9 @@ def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
         (("agent=belief", "planner.source_filter=bayes"), "planner.source_filter"),
         (("agent=belief", "planner.stop_above=0.3"), "planner.stop_above"),
         (("agent=belief", "planner.model.kept=2"), "planner.model.kept: 2"),
+        (("agent=direction_follower", "planner.ahead=0.5"), "planner.ahead: 0.5"),
+        (("agent=direction_follower", "planner.stop_within=1"), "planner.stop_within"),
+        (("agent=frontier", "planner.sector=0"), "planner.sector: 0"),
         (("agent=plan_noexp", "mapper=none"), "mapper: 'none' remembers nothing to plan on"),
         (("agent=plan_noexp", "look=twice"), "look: 'twice' is none of once, around"),
         (("agent=plan_noexp", "subset=all"), "subset: 'all' is none of train, validation, test"),

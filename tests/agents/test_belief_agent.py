@@ -3,66 +3,18 @@
 import dataclasses
 import math
 
-import numpy as np
 import pandas as pd
 import pytest
 import torch
+from heard_places import BINS, SIZE, heard, run
 from small_places import FLAT, STOP, VAR
-from torch import Tensor
 
 from avn.agents.belief_agent import BeliefAgent, goal_offsets
-from avn.agents.rollout import Labels, rollout_scene
-from avn.apartments.local_patch import window_cells
 from avn.core.errors import UserError
-from avn.core.heard import bearing_label
-from avn.dataset.source_locations import to_headings
 from avn.mapping.occupancy_mapper import OccupancyMapper
-from avn.navigation.episodes import exhaustive_episodes
-from avn.navigation.navigation_scene import DrawnScene, draw
-from avn.navigation.observations import SceneObservations
+from avn.navigation.navigation_scene import draw
 from avn.navigation.protocols import Protocol
 from avn.planning.settings import ArrivalModel
-from avn.planning.sound_fields import SQUARES, sound_fields
-
-BINS = 72
-SIZE = 35  # squares of the map, enough from every start
-
-
-def heard(scene: DrawnScene) -> Tensor:
-    """Exact direction and length of the path of sound from every state, (K, S, 1, 1, B + 6)."""
-    lattice = scene.grid.lattice.astype(np.int64)
-    cells, size = len(lattice), int(lattice.max()) + 1
-    cost = np.full((1, size, size), np.inf, np.float32)
-    cost[0, lattice[:, 1], lattice[:, 0]] = 1
-    fields = np.empty((1, cells, size, size), np.int16), np.empty((1, cells, size, size), np.uint8)
-    every = np.arange(cells)
-    sound_fields(cost, lattice[None], np.zeros(cells, np.int64), every, 500, BINS, *fields)
-    found = []
-    for source in scene.sources:
-        x, y = lattice[source]
-        units, bins = fields[0][0, :, y, x], fields[1][0, :, y, x]
-        angle = torch.from_numpy(bins * (2 * math.pi / BINS))
-        there = torch.from_numpy(bins < BINS)
-        east, north = (torch.where(there, own, 0.0) for own in (angle.sin(), angle.cos()))
-        direction = to_headings(east[None].float(), north[None].float())[0]
-        label = bearing_label(direction, BINS, 2 * math.pi / BINS).clamp_min(1e-9).log()
-        metres = np.maximum(units * SQUARES * 0.5, 0.25)
-        length = torch.from_numpy(np.log(metres)).float().repeat_interleave(4)[:, None]
-        other = torch.zeros(len(label), 4)
-        found.append(torch.cat((label, length, torch.full_like(length, 0.1), other), 1))
-    return torch.stack(found)[:, :, None, None]
-
-
-def run(agent: BeliefAgent, protocol: Protocol, arrival: Tensor | None = None) -> pd.DataFrame:
-    scene = draw("flat", FLAT)
-    audio = {"arrival": heard(scene) if arrival is None else arrival}
-    goal = torch.from_numpy(protocol.goal_cells(scene.grid, np.asarray(scene.sources)))
-    audio["stop_probability"] = goal.repeat_interleave(4, dim=1)[:, :, None, None].float()
-    seen = {"local_patch": torch.from_numpy(window_cells(scene.grid) >= 0).float()}
-    episodes = exhaustive_episodes(scene, ["ring"], protocol, seed=0)
-    observations = SceneObservations(audio, seen)
-    labels = Labels("belief", "diffraction")
-    return rollout_scene(agent, scene, episodes, protocol, labels, observations)
 
 
 @pytest.mark.parametrize("protocol", [VAR, STOP], ids=["var", "stop"])

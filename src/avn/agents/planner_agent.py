@@ -135,6 +135,8 @@ class PlannerAgent(Agent):
         self._source_belief: SourceBelief | None = None
         # Without Stop an episode also ends in the cells around the source.
         self._near = 1 if protocol.goal == "box" and not protocol.requires_stop else 0
+        # Squares between a target and the end of the path to it.
+        self._reach = self._near
         self._active = np.ones(n, dtype=np.bool_)
         self._direction = torch.full((n,), -1)
         self._turns = torch.zeros(n, dtype=torch.int64)
@@ -217,7 +219,7 @@ class PlannerAgent(Agent):
             1.0 if self.protocol.counts_turns else _TIE,
             0.0 if self.backward else np.inf,
             active,
-            self._near,
+            self._reach,
         )
         return torch.from_numpy(np.where(action == NO_ACTION, ROTATE_RIGHT, action))
 

@@ -8,9 +8,17 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from avn.core.errors import UserError
+
 # Numbers behind the bins of the bearing: mean and standard deviation of the logarithm of the length
 # of the path in metres, log-odds of being in sight, metres right and front, standard deviation.
 OTHERS = 6
+
+
+def check_bins(bins: int) -> None:
+    """Raise `UserError` for a number of directions of a sound model that the planner cannot use."""
+    if bins % 4 or not 8 <= bins <= 252:
+        raise UserError(f"sound_model.bins: {bins}; give a multiple of 4 from 8 to 252")
 
 
 def bearing_label(arrival: Tensor, bins: int, spread: float) -> Tensor:

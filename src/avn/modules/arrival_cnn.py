@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from torchmetrics import MeanMetric
 
 from avn.core.errors import UserError
-from avn.core.heard import OTHERS, Arrivals, bearing_label
+from avn.core.heard import OTHERS, Arrivals, bearing_label, check_bins
 from avn.modules.arrival_metrics import ArrivalErrors
 from avn.modules.audio_network import FIVE_LAYERS, PictureBatch
 from avn.modules.network import SUBSETS, Part
@@ -54,8 +54,7 @@ class ArrivalCnn(SoundCnn):
     def __init__(
         self, bins: int = 72, spread: float = 5.0, net: Part = HEADS, **recipe: Any
     ) -> None:
-        if bins % 4 or not 8 <= bins <= 252:
-            raise UserError(f"sound_model.bins: {bins}; give a multiple of 4 from 8 to 252")
+        check_bins(bins)
         if not 0 < spread <= 90:
             raise UserError(f"sound_model.spread: {spread}; give more than 0 and up to 90 degrees")
         self.bins, self.spread = bins, math.radians(spread)

@@ -87,9 +87,10 @@ def agent_content(cfg: DictConfig) -> list[Any]:
 
 def decides(cfg: DictConfig) -> bool:
     """Return whether the agent stops by the probability of the stop classifier."""
-    return bool(
-        cfg.planner._target_ and cfg.protocol.requires_stop and stop_classifier.has_stop_model(cfg)
-    )
+    planned = cfg.planner._target_ and cfg.protocol.requires_stop
+    if not (planned and stop_classifier.has_stop_model(cfg)):
+        return False
+    return "stop_probability" in build_agent(cfg).wants(build_object("protocol", cfg.protocol))
 
 
 def agent_stages(cfg: DictConfig) -> list[Stage]:

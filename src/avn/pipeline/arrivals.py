@@ -8,11 +8,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from avn.pipeline.audio_inference import AudioInference
-from avn.pipeline.sound_network import SoundNetwork
+from avn.pipeline.sound_network import HeardBySoundModel
 
 
-class ArrivalEstimates(AudioInference):
+class ArrivalEstimates(HeardBySoundModel):
     """Stage of the outputs of the heads for every clip.
 
     The product is (K, S, sounds, realisations, bins + 6) float16 per apartment; see
@@ -20,11 +19,6 @@ class ArrivalEstimates(AudioInference):
     """
 
     kind = "hear/arrivals"
-
-    @property
-    def network(self) -> SoundNetwork:
-        """Stage of the sound network."""
-        return SoundNetwork(self.cfg)
 
     def output_of(self, model: Any) -> Callable[[Tensor], Tensor]:
         """Return the function from clips to the outputs of the heads."""

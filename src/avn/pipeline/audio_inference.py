@@ -27,7 +27,6 @@ from avn.pipeline.apartments import Apartments
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
-from avn.pipeline.trained_on_clips import TrainedOnClips
 
 if TYPE_CHECKING:
     from avn.modules.audio_network import AudioNetwork
@@ -101,8 +100,8 @@ class AudioInference(ApartmentTensors):
 
     @property
     @abstractmethod
-    def network(self) -> TrainedOnClips:
-        """Stage of the network."""
+    def network(self) -> Any:
+        """Stage of the network, with the sampling rate `rate` of its clips."""
 
     def output_of(self, model: Any) -> Callable[[Tensor], Tensor]:
         """Return the function from a batch of clips to outputs; the model by default."""

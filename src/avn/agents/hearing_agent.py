@@ -1,0 +1,105 @@
+"""Base class of agents that walk by the newest heard arrival of the sound alone."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from avn.agents.planner_agent import PlannerAgent
+from avn.apartments.floor_plan import CELL
+from avn.core.actions import HEADINGS
+from avn.core.errors import UserError
+from avn.core.heard import Arrivals
+from avn.core.pose import turned
+from avn.mapping.base import Mapper
+from avn.navigation.protocols import Protocol
+from avn.planning.settings import SourceErrorModel
+from avn.planning.source_belief import SourceBelief
+
+if TYPE_CHECKING:
+    from tensordict import TensorDict
+
+
+class HearingAgent(PlannerAgent):
+    """Agent whose target follows from the newest arrival of the sound; it keeps no posterior.
+
+    Parameters
+    ----------
+    mapper : Mapper
+        Builds the map and localises the agent.
+    stop_within : float
+        Length of the path of the sound below which the agent stops, for protocols with Stop;
+        metres, more than 0 and up to 100. The path ends at the height of the source.
+    stop_above : float
+        Probability of such a length, by the heard distribution, from which it stops; more than 0
+        and below 1.
+    **planner
+        Other parameters of `PlannerAgent`, without those of its source filter.
+
+    Raises
+    ------
+    UserError
+        If a setting is out of range.
+    """
+
+    def __init__(
+        self, mapper: Mapper, stop_within: float = 0.9, stop_above: float = 0.5, **planner: Any
+    ) -> None:
+        super().__init__(mapper, **planner)
+        if not 0 < stop_within <= 100:
+            raise UserError(
+                f"planner.stop_within: {stop_within}; give metres, more than 0 and up to 100"
+            )
+        if not 0 < stop_above < 1:
+            raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and less than 1")
+        self.stop_within, self.stop_above = stop_within, stop_above
+        self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
+
+    def wants(self, protocol: Protocol) -> tuple[str, ...]:
+        """Return the observations it needs, the same under every protocol. See `Agent.wants`."""
+        return self.needs
+
+    def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
+        """Return the settings of the source filter, and those of Stop that do not count."""
+        stop = () if protocol.requires_stop else ("stop_within", "stop_above")
+        return ("source_filter", "error", *stop)
+
+    def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
+        """Begin N new episodes. See `Agent.reset`."""
+        super().reset(n, generator, protocol)
+        # direction on the map, turns clockwise from its front
+        self._heard = np.zeros(n)
+
+    def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
+        heard = Arrivals(observation["arrival"].float())
+        pose = self.mapper.pose
+        if self._source_belief is None:
+            size = self.mapper.graph.cost.shape[1]
+            self._source_belief = SourceBelief(self.n, size, "latest", SourceErrorModel())
+        # Directions heard with different headings at one place may contradict each other.
+        updated = active & (self._turns < self.max_rotations).numpy()
+        turns = heard.bearing.argmax(-1).numpy() / heard.bins + pose[:, 2].numpy() / HEADINGS
+        self._heard = np.where(updated, turns % 1.0, self._heard)
+        aim = self._aim(heard, pose[:, 2])
+        self._source_belief.update(pose[:, :2].numpy(), aim, aim, updated)
+        self._source_belief.rule_out(pose[:, :2].numpy(), self._near, active)
+
+    @abstractmethod
+    def _aim(self, heard: Arrivals, heading: Tensor) -> NDArray[np.float64]:
+        """Return the column and row of the place that the agents walk to, (N, 2) float64."""
+
+    def _stops(self, observation: TensorDict) -> Tensor:
+        mean, sigma = Arrivals(observation["arrival"].float()).distance.unbind(-1)
+        within = torch.special.ndtr((math.log(self.stop_within) - mean) / sigma)
+        return within >= self.stop_above
+
+    def _on_map(self, metres: Tensor, heading: Tensor) -> NDArray[np.float64]:
+        """Return the column and row of places (N, 2) in metres to the agents' right and front."""
+        away: Tensor = turned(metres.double() / CELL, heading)
+        return (self.mapper.location + away).numpy()
