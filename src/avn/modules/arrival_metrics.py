@@ -13,6 +13,30 @@ from avn.core.heard import Arrivals
 from avn.modules.sound_metrics import SIGHTS
 
 
+def arrival_errors(heard: Arrivals, target: Tensor) -> tuple[Tensor, Tensor]:
+    """Compute the errors of N estimates.
+
+    Parameters
+    ----------
+    heard : Arrivals
+        Estimates, (N, bins + 6).
+    target : (N, 5) tensor
+        See `avn.modules.arrival_cnn.ArrivalCnn.loss`.
+
+    Returns
+    -------
+    degrees, logs : (N,) tensors
+        Error of the direction, whose estimate is the mean of the distribution as a vector, 0 to
+        180 degrees, and of the logarithm of the length.
+    """
+    angles = torch.arange(heard.bins) * (2 * math.pi / heard.bins)
+    mean = heard.bearing.exp() @ torch.stack((angles.sin(), angles.cos()), 1)
+    cross = mean[:, 0] * target[:, 1] - mean[:, 1] * target[:, 0]
+    dot = (mean * target[:, :2]).sum(1)
+    degrees = torch.rad2deg(torch.atan2(cross.abs(), dot))
+    return degrees, (heard.distance[:, 0] - target[:, 2]).abs()
+
+
 class ArrivalErrors(Metric):
     """Median errors of arrivals, in sight and out of sight.
 
@@ -38,15 +62,9 @@ class ArrivalErrors(Metric):
         in_sight : (N,) bool tensor
             Whether the source is in sight.
         """
-        angles = torch.arange(heard.bins) * (2 * math.pi / heard.bins)
-        axes = torch.stack((angles.sin(), angles.cos()), 1)
-        mean = heard.bearing.exp() @ axes
-        cross = mean[:, 0] * target[:, 1] - mean[:, 1] * target[:, 0]
-        dot = (mean * target[:, :2]).sum(1)
         there = target[:, :2].square().sum(1) > 0
-        degrees = torch.rad2deg(torch.atan2(cross.abs(), dot))
+        degrees, logs = arrival_errors(heard, target)
         self.degrees.append(degrees[there])  # type: ignore[union-attr, operator]
-        logs = (heard.distance[:, 0] - target[:, 2]).abs()
         self.logs.append(logs[there])  # type: ignore[union-attr, operator]
         self.in_sight.append(in_sight[there])  # type: ignore[union-attr, operator]
 

@@ -16,12 +16,14 @@ from avn.core.settings import typed
 from avn.dataset.scene import Scene
 from avn.mapping.place_errors import place_errors
 from avn.navigation.observations import SceneObservations
+from avn.pipeline.arrival_errors import errors_by_scene
 from avn.pipeline.audio_inference import source_estimate_errors
 from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork, local_patch_errors
+from avn.pipeline.scenes import acoustics_of
 from avn.pipeline.sounds import sound_files
 from avn.reporting import results
-from avn.reporting.finished_run import LOCAL_PATCHES, LOCALISATION, SOURCE_ESTIMATES
+from avn.reporting.finished_run import ARRIVALS, LOCAL_PATCHES, LOCALISATION, SOURCE_ESTIMATES
 
 
 def write(
@@ -52,6 +54,9 @@ def write(
         results.write_csv(
             _source_estimates(cfg, scenes, source_estimates), folder / SOURCE_ESTIMATES
         )
+    if "arrival" in stages:
+        acoustics = acoustics_of(observed.apartments)
+        results.write_csv(errors_by_scene(scenes, observations, acoustics), folder / ARRIVALS)
     if "local_patch" in stages:
         estimates = [patches[:, 0] for patches in stages["local_patch"].load()]
         prior = OccupancyNetwork(cfg).prior()

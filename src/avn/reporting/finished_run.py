@@ -11,13 +11,15 @@ from avn.core.errors import UserError
 from avn.reporting import perception_tables, results, table
 
 RESULTS, EPISODE_RECORDS = "results.csv", "episodes.csv"
-SOURCE_ESTIMATES, LOCAL_PATCHES, LOCALISATION = (
+SOURCE_ESTIMATES, ARRIVALS, LOCAL_PATCHES, LOCALISATION = (
     "source_estimates.csv",
+    "arrivals.csv",
     "local_patches.csv",
     "localisation.csv",
 )
 _PERCEPTION = {
     SOURCE_ESTIMATES: perception_tables.source_estimates_table,
+    ARRIVALS: perception_tables.arrivals_table,
     LOCAL_PATCHES: perception_tables.local_patches_table,
     LOCALISATION: perception_tables.localisation_table,
 }

@@ -33,6 +33,24 @@ def source_estimates_table(source_estimates: pd.DataFrame) -> Table:
     return table
 
 
+def arrivals_table(arrivals: pd.DataFrame) -> Table:
+    """Tabulate the errors of how sound is heard to arrive, as means over scenes.
+
+    Parameters
+    ----------
+    arrivals : DataFrame
+        Errors of any number of scenes; see `avn.pipeline.arrival_errors.errors_by_scene`.
+    """
+    columns = ("direction, degrees", "direction > 90 degrees", "log of the length")
+    table = _table("arrivals: mean over scenes of the median error of single clips", columns)
+    metrics = ["arrival_deg", "behind", "log_length"]
+    means = arrivals.groupby("sight", as_index=False, sort=False)[metrics].mean()
+    for row in means.to_dict("records"):
+        degrees, share = f"{row['arrival_deg']:.0f}", f"{100 * row['behind']:.0f} %"
+        table.add_row(row["sight"].replace("_", " "), degrees, share, f"{row['log_length']:.2f}")
+    return table
+
+
 def local_patches_table(seen: pd.DataFrame) -> Table:
     """Tabulate the accuracy of predicted local occupancy patches, beside that of the prior.
 
