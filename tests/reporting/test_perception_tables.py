@@ -3,6 +3,7 @@ import pytest
 from rich.console import Console
 
 from avn.reporting.perception_tables import (
+    arrivals_table,
     local_patches_table,
     localisation_table,
     source_estimates_table,
@@ -20,6 +21,12 @@ def test_what_is_heard_is_the_mean_of_the_rooms():
     row = {"sound": "alarm", "sight": "in_sight", "bearing_deg": 10.0, "front_back": 0.25}
     source_estimates = pd.DataFrame([{**row, "error_m": 1.0}, {**row, "error_m": 2.0}])
     assert lines(source_estimates_table(source_estimates))[-1] == "alarm, in sight 1.50 10 25 %"
+
+
+def test_arrivals_are_the_mean_of_the_rooms():
+    row = {"sight": "out_of_sight", "clips": 9, "behind": 0.1, "log_length": 0.25}
+    arrivals = pd.DataFrame([{**row, "arrival_deg": 10.0}, {**row, "arrival_deg": 20.0}])
+    assert lines(arrivals_table(arrivals))[-1] == "out of sight 15 10 % 0.25"
 
 
 def test_windows_are_those_of_all_rooms():
