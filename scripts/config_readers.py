@@ -93,6 +93,7 @@ def find_readers(keys: Mapping[str, Sequence[str]], values: Mapping[str, Sequenc
     # `plan_*` before `ours_*`, whose settings make others unread
     runs = [("eval", f"agent={row}") for row in reversed(options_of("agent"))]
     runs.append(("eval", "agent=external", f"baseline.observations=[{','.join(OBSERVATIONS)}]"))
+    runs.append(("eval", "agent=belief", "episodes=one_sound"))
     runs += [("train", f"model={model}") for model in options_of("model")]
     unseen = {group: set(options_of(group)) for group in keys}
     unseen["sound"] = set()  # recordings, which no stage tells apart

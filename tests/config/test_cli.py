@@ -38,7 +38,7 @@ def test_a_key_that_no_schema_declares_is_refused_even_behind_a_plus():
         (["+acoustics.rayz=5"], "acoustics.rayz"),
         (["+foo=5"], "foo"),
         (["acoustics.rays=many"], "rays"),
-        (["episodes=all"], "episodes: 'all' is none of frozen, exhaustive"),
+        (["episodes=all"], "episodes: 'all' is none of frozen, one_sound, exhaustive"),
         (["sound=missing.wav"], "missing.wav"),
         (["sound=telefone"], "there is no 'telefone'; there are alarm, alarms, all, all_test"),
         (["sound=[ring,dog_3]"], "name of a recording (dog_large, dog_single"),
