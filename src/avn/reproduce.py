@@ -19,24 +19,33 @@ def main(cfg: DictConfig) -> Path:
 
     With `table=conditions` each row is evaluated in each condition.
     """
-    from avn.config.defaults import default_config
-    from avn.pipeline.condition_table import tabulate
-    from avn.pipeline.reproduction import reproduce, settings_of
+    from avn.pipeline.reproduction import check_lists
 
-    if cfg.conditions:
-        pairs = [
-            (row, own) for row in dict.fromkeys(cfg.rows) for own in dict.fromkeys(cfg.conditions)
-        ]
-        composed = {pair: compose_row(cfg, *pair) for pair in pairs}
-        refuse_unread("reproduce", cfg, settings_of([*composed.values()]))
-        folder = tabulate(cfg, composed)
-        log(str(folder))
-        return folder
-    rows = [compose_row(cfg, row) for row in dict.fromkeys(cfg.rows)]
-    refuse_unread("reproduce", cfg, settings_of(rows))
-    folder = reproduce(cfg, rows, [default_config(row) for row in rows])
+    check_lists(cfg)
+    folder = _conditions(cfg) if cfg.conditions else _rows(cfg)
     log(str(folder))
     return folder
+
+
+def _rows(cfg: DictConfig) -> Path:
+    """Make the table of rows x scenes and sounds."""
+    from avn.config.defaults import default_config
+    from avn.pipeline.reproduction import reproduce, settings_of
+
+    rows = [compose_row(cfg, row) for row in dict.fromkeys(cfg.rows)]
+    refuse_unread("reproduce", cfg, settings_of(rows))
+    return reproduce(cfg, rows, [default_config(row) for row in rows])
+
+
+def _conditions(cfg: DictConfig) -> Path:
+    """Make the table of rows x conditions."""
+    from avn.pipeline.condition_table import tabulate
+    from avn.pipeline.reproduction import settings_of
+
+    pairs = [(row, own) for row in dict.fromkeys(cfg.rows) for own in dict.fromkeys(cfg.conditions)]
+    composed = {pair: compose_row(cfg, *pair) for pair in pairs}
+    refuse_unread("reproduce", cfg, settings_of([*composed.values()]))
+    return tabulate(cfg, composed)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from omegaconf import DictConfig
 
 from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest
-from avn.pipeline.reproduction import check_lists, make_runs, runs_of, with_networks
+from avn.pipeline.reproduction import make_runs, runs_of, with_networks
 from avn.pipeline.run import agent_label
 from avn.reporting import condition_table, results, table
 from avn.reporting.condition_table import CONDITION
@@ -40,7 +40,6 @@ def tabulate(cfg: DictConfig, composed: Mapping[tuple[str, str], DictConfig]) ->
     UserError
         Where an option cannot work, or something is missing and `auto` is false.
     """
-    check_lists(cfg)
     cells = {key: runs_of(cfg, config) for key, config in composed.items()}
     configs = [config for runs in cells.values() for config in runs]
     names = [f"{row} {condition}" for (row, condition), runs in cells.items() for _ in runs]

@@ -58,7 +58,6 @@ def reproduce(cfg: DictConfig, rows: Sequence[DictConfig], defaults: Sequence[Di
     UserError
         Where an option cannot work, or something is missing and `auto` is false.
     """
-    check_lists(cfg)
     configs = [config for row in rows for config in runs_of(cfg, row)]
     paper = paper_sounds_by_agent(rows, defaults)
     folders = make_runs(configs, [str(config.agent.name) for config in configs], paper)

@@ -1,0 +1,42 @@
+"""`avn.reproduce table=conditions`, on the real pipeline with agents that need no network."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+SMALL = ("split=mini", "protocol.num_starts=4", "rows=random_walk,oracle", "train_seeds=0")
+
+
+def test_rows_and_conditions_are_evaluated_and_written(command, tmp_path):
+    arguments = ("table=conditions", *SMALL, "conditions=heard,noise_white_10")
+    code, out, err = command("reproduce", *arguments, f"outputs={tmp_path}")
+    assert code == 0, err
+    folder = Path(out[-1])
+    cells = pd.read_csv(folder / "cells.csv").set_index(["agent", "condition"])
+    assert set(cells.index) == {
+        (row, condition)
+        for row in ("random_walk", "oracle")
+        for condition in ("heard", "noise_white_10")
+    }
+    assert (cells["acoustics"] == "diffraction").all(), "the hard world, unless another is given"
+    assert (cells.loc["oracle", ["sr", "spl"]] == 100).all(axis=None)
+    # neither hears, and all conditions have the same starts
+    assert cells.loc[("random_walk", "heard"), "sr"] == pytest.approx(
+        cells.loc[("random_walk", "noise_white_10"), "sr"]
+    )
+    text = (folder / "table.md").read_text()
+    assert "`noise_white_10`" in text
+    assert "one sound an episode" in text
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [("conditions=loud", "condition"), ("rows=[]", "rows: empty")],
+)
+def test_what_cannot_work_is_one_line(command, tmp_path, given, named):
+    usual = "conditions=heard" if given.startswith("rows") else "rows=random_walk"
+    code, _, err = command("reproduce", "table=conditions", usual, given, f"outputs={tmp_path}")
+    assert code == 2
+    assert len(err) == 1
+    assert named in err[0]
