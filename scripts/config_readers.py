@@ -96,7 +96,8 @@ def find_readers(keys: Mapping[str, Sequence[str]], values: Mapping[str, Sequenc
     runs.append(("eval", "agent=belief", "episodes=one_sound"))
     runs += [("train", f"model={model}") for model in options_of("model")]
     unseen = {group: set(options_of(group)) for group in keys}
-    unseen["sound"] = set()  # recordings, which no stage tells apart
+    # recordings, which no stage tells apart, and overrides of other groups
+    unseen |= {group: set() for group in ("sound", "condition", "table")}
     kinds: dict[frozenset[str], tuple[str, ...]] = {}
     for run in [*runs, ("generate",)]:
         kinds.setdefault(frozenset(readers.add(run)), run)
