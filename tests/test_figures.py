@@ -78,10 +78,12 @@ def test_tensorboard_finds_curves_hparams_figures_and_audio_under_one_folder(com
     heard = {name: tags for name, tags in trained.items() if name.startswith("train/sound_cnn-")}
     assert heard
     for name, tags in heard.items():
-        assert name.split("/")[2] == "sound_cnn-resonance-mini-ring+alarm+clock-seed0"
         settings, metrics = hparams(found, name)
         assert settings["with_kind"].string_value == "training"
-        assert settings["sounds_in_training"].string_value == "ring+alarm+clock"
+        # other rows of the session train on many sounds
+        sounds = settings["sounds_in_training"].string_value
+        assert sounds in ("ring+alarm+clock", "65-sounds")
+        assert name.split("/")[2] == f"sound_cnn-resonance-mini-{sounds}-seed0"
         # the columns of all rows of the HPARAMS tab are the same
         assert (list(settings), metrics) == first
         assert "best_validation" in tags["scalars"]
