@@ -61,14 +61,22 @@ def head_content(head: str = DEFAULT, key: str = "acoustics.head") -> bytes:
     return f"{file_hash(_path(head, key))} fit {sh_fit.VERSION}".encode()
 
 
-def head_filters(rate: int, head: str = DEFAULT) -> NDArray[np.float32]:
-    """Return the binaural filters of a head at a rate in Hz, (4, 2, 16, taps), cached."""
-    return _filters(rate, head, head_content(head))
+def head_filters(
+    rate: int, head: str = DEFAULT, key: str = "acoustics.head"
+) -> NDArray[np.float32]:
+    """Return the binaural filters of a head at a rate in Hz, (4, 2, 16, taps), cached.
+
+    Raises
+    ------
+    UserError
+        If there is no such head, or its file cannot be used.
+    """
+    return _filters(rate, head, head_content(head, key), key)
 
 
 @lru_cache(maxsize=8)
-def _filters(rate: int, head: str, content: bytes) -> NDArray[np.float32]:
-    return load_head(head).filters(rate)
+def _filters(rate: int, head: str, content: bytes, key: str) -> NDArray[np.float32]:
+    return load_head(head, key).filters(rate)
 
 
 @lru_cache(maxsize=8)

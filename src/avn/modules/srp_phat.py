@@ -204,7 +204,8 @@ def head_differences(
     """
     angle = np.arange(bins) * (2 * math.pi / bins)
     directions = np.stack((np.sin(angle), np.cos(angle), np.zeros(bins)), -1)
-    ears = np.einsum("ect,bc->bet", head_filters(rate, head)[0].astype(np.float64), sh(directions))
+    filters = head_filters(rate, head, "sound_model.head")[0].astype(np.float64)
+    ears = np.einsum("ect,bc->bet", filters, sh(directions))
     left, right = torch.fft.rfft(torch.from_numpy(ears), window).unbind(1)
     cross = left * right.conj()
     phase = cross / cross.abs().clamp_min(_LEAST)

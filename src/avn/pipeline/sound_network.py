@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import torch
 from omegaconf import DictConfig
 
+from avn.acoustics.heads import head_content
 from avn.core.classes import build_object, import_class
 from avn.core.errors import UserError
+from avn.core.hashing import digest
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.scenes import acoustics_of
@@ -117,6 +119,11 @@ class SoundFormula(Stage):
     def settings(self) -> Sequence[str]:
         """Return the keys of the model and of the sampling rate."""
         return ("sound_model", f"{self.apartments.world.acoustics}.rate")
+
+    def content(self) -> Any:
+        """Return the hash of the head that the model knows; a file enters by its content."""
+        head = self.cfg.sound_model.get("head")
+        return None if head is None else digest(head_content(head, "sound_model.head").hex())
 
     def ignored(self) -> Sequence[str]:
         """Return the key of a checkpoint, which it cannot have."""
