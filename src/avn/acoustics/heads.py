@@ -64,7 +64,14 @@ def head_content(head: str = DEFAULT, key: str = "acoustics.head") -> bytes:
 def head_filters(
     rate: int, head: str = DEFAULT, key: str = "acoustics.head"
 ) -> NDArray[np.float32]:
-    """Return the binaural filters of a head at a rate in Hz, (4, 2, 16, taps), cached.
+    """Return the binaural filters of a head, (4, 2, 16, taps), cached.
+
+    Parameters
+    ----------
+    rate : int
+        Sampling rate of the filters, Hz.
+    head, key : str
+        See `load_head`.
 
     Raises
     ------
