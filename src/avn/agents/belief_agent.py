@@ -44,6 +44,8 @@ class BeliefAgent(PlannerAgent):
         Probability from which it stops by "classifier", 0 to 1.
     confirm : bool
         Whether it turns until it has heard all four headings of a square before it stops there.
+    patience : float or None
+        Actions after which `stop_above` has halved, more than 0; None for never.
     **planner
         Other parameters of `PlannerAgent`, without those of its source filter.
     """
@@ -56,6 +58,7 @@ class BeliefAgent(PlannerAgent):
         stop_above: float = 0.5,
         stop_at: float = 0.5,
         confirm: bool = True,
+        patience: float | None = None,
         **planner: Any,
     ) -> None:
         super().__init__(mapper, stop_at=stop_at, **planner)
@@ -64,7 +67,9 @@ class BeliefAgent(PlannerAgent):
         if not 0 < stop_above <= 1:
             raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and up to 1")
         self.model, self.stop_by, self.stop_above = model or ArrivalModel(), stop_by, stop_above
-        self.confirm = confirm
+        if patience is not None and not patience > 0:
+            raise UserError(f"planner.patience: {patience}; give actions, more than 0, or null")
+        self.confirm, self.patience = confirm, patience
         self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
@@ -76,13 +81,14 @@ class BeliefAgent(PlannerAgent):
         """Return the settings of the source filter, and those of Stop that do not count."""
         classified = protocol.requires_stop and self.stop_by == "classifier"
         stop = () if protocol.requires_stop else ("stop_by", "confirm")
-        above = ("stop_above",) if classified or not protocol.requires_stop else ()
+        above = ("stop_above", "patience") if classified or not protocol.requires_stop else ()
         return ("source_filter", "error", *stop, *above)
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
         """Begin N new episodes. See `Agent.reset`."""
         super().reset(n, generator, protocol)
         self._belief: ArrivalBelief | None = None
+        self._actions = 0
         self._goal = goal_offsets(protocol)
 
     def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
@@ -92,6 +98,7 @@ class BeliefAgent(PlannerAgent):
             self._belief = ArrivalBelief(self.n, graph.cost.shape[1], heard.bins, self.model)
         belief = self._belief
         squares = heard.distance - torch.tensor([math.log(CELL), 0.0])
+        self._actions += 1
         belief.hear(pose, heard.bearing.numpy(), squares.numpy(), active)
         if not (self.protocol.requires_stop and self.stop_by == "belief"):
             belief.rule_out(pose[:, :2], self._near, active)
@@ -115,7 +122,10 @@ class BeliefAgent(PlannerAgent):
             return super()._stops(observation)
         assert self._belief is not None
         position = self.mapper.pose[:, :2].numpy()
-        return torch.from_numpy(self._belief.near(position, self._goal) >= self.stop_above)
+        enough = self.stop_above
+        if self.patience is not None:
+            enough *= 0.5 ** (self._actions / self.patience)
+        return torch.from_numpy(self._belief.near(position, self._goal) >= enough)
 
 
 def goal_offsets(protocol: Protocol) -> NDArray[np.int64]:
