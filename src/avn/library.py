@@ -29,6 +29,7 @@ from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.pipeline.apartments import Apartments, PerApartment
+from avn.pipeline.dynamics import build_dynamics, changing
 from avn.pipeline.export import settings_of
 from avn.pipeline.models import model_of, train_model
 from avn.pipeline.observations import Observed
@@ -207,7 +208,7 @@ def make_simulator(
     index = names.index(name) if name else 0
     protocol: Protocol = build_object("protocol", cfg.protocol)
     episodes = episodes_of(cfg, scenes[index], protocol)
-    return Simulator(scenes[index], episodes, protocol, seen[index])
+    return Simulator(scenes[index], episodes, protocol, seen[index], build_dynamics(cfg))
 
 
 def evaluate(agent: str | Agent, overrides: Overrides = ()) -> pd.DataFrame:
@@ -251,7 +252,10 @@ def _walk(agent: Agent, cfg: DictConfig, given: Sequence[str]) -> pd.DataFrame:
     scenes, observations = _scenes(cfg, given, name, agent.wants(protocol))
     labels = Labels(agent=name, acoustics=cfg.acoustics.name)
     records = [
-        rollout_scene(agent, scene, episodes_of(cfg, scene, protocol), protocol, labels, seen)
+        rollout_scene(
+            *(agent, scene, episodes_of(cfg, scene, protocol), protocol, labels, seen),
+            dynamics=build_dynamics(cfg),
+        )
         for scene, seen in zip(scenes, observations, strict=True)
     ]
     return pd.concat(records, ignore_index=True)
@@ -265,7 +269,8 @@ def _scenes(
     observed = Observed(apartments, wanted)
     observed.check(agent, wanted)
     geometry, stages = Geometry(cfg, apartments), observed.stages
-    own = leaves(cfg, ["agent", "protocol", "episodes", "seed", "subset", "sound", "exploration"])
+    keys = ["agent", "protocol", "episodes", "seed", "subset", "sound", "exploration"]
+    own = leaves(cfg, [*keys, *changing(cfg)])
     with composing():
         read = own.union(*(stage.read() for stage in (geometry, *stages.values())))
         refuse_unread("eval", cfg, {*read, *observed.settings}, given)

@@ -166,14 +166,66 @@ class ClipRenderer:
         float32 tensor, shape (N, 2, rate)
             Left and right ear. 16 to 128 clips a call are fastest on a CPU, for its caches.
         """
-        sound = clip.sound
-        words = torch.stack(clip._replace(sound=self.sounds.keys[sound]), dim=-1)
-        key = absorb(self._key, words.to(torch.int64))
-        place, phase = (integers(key, draw) for draw in range(_FIRST_DRAW))
-        dry = torch.fft.rfft(self.sounds.seconds(sound, place, phase))
+        return self.record(self.at_ears(spectra, clip, index), clip)
+
+    def at_ears(self, spectra: Tensor, clip: ClipId, index: Tensor | None = None) -> Tensor:
+        """Render the sound at the ears in the steady state, without microphones. See `render`."""
+        dry = torch.fft.rfft(self._dry(clip))
         used = spectra if index is None else spectra[index]
-        clips = torch.fft.irfft(dry[:, None, :] * used, n=self.sounds.rate)
-        return self.microphone.record(clips, _Noise(self._noise, self.sounds.rate, key))
+        return torch.fft.irfft(dry[:, None, :] * used, n=self.sounds.rate)
+
+    def between(self, brirs: Tensor, clip: ClipId, begin: Tensor, end: Tensor) -> Tensor:
+        """Render the sound at the ears of sources that begin or end.
+
+        The sound of the clip, repeated every second, is switched on and off, and convolved with
+        the response of the place where it is heard. What was emitted in earlier seconds is heard
+        as far as the response lasts: the first silent second has the reverberant tail.
+
+        Parameters
+        ----------
+        brirs : float32 tensor, shape (N, 2, T)
+            Responses of the place of the clip.
+        clip : ClipId
+            Identity of the clips.
+        begin, end : float64 tensor, shape (N,)
+            Seconds between which the source emits sound, relative to the beginning of the clip.
+
+        Returns
+        -------
+        float32 tensor, shape (N, 2, rate)
+        """
+        rate, samples = self.sounds.rate, brirs.shape[-1]
+        before = -(-samples // rate) * rate  # samples before the clip that are still heard
+        times = torch.arange(-before, rate, device=brirs.device) / rate
+        emitted = (times >= begin[:, None]) & (times < end[:, None])
+        dry = self._dry(clip).repeat(1, before // rate + 1) * emitted
+        # the size of the transform keeps the end of the convolution off the clip
+        size = dry.shape[-1]
+        found = torch.fft.irfft(torch.fft.rfft(dry)[:, None] * torch.fft.rfft(brirs, n=size), size)
+        return found[..., before:].contiguous()
+
+    def record(self, sound: Tensor, clip: ClipId) -> Tensor:
+        """Return what the microphones record of the sound at the ears; may change it in place.
+
+        Parameters
+        ----------
+        sound : float32 tensor, shape (N, 2, rate)
+            As of `at_ears`.
+        clip : ClipId
+            Identity of the clips, for the noise.
+        """
+        return self.microphone.record(
+            sound, _Noise(self._noise, self.sounds.rate, self._keys(clip))
+        )
+
+    def _keys(self, clip: ClipId) -> Tensor:
+        words = torch.stack(clip._replace(sound=self.sounds.keys[clip.sound]), dim=-1)
+        return absorb(self._key, words.to(torch.int64))
+
+    def _dry(self, clip: ClipId) -> Tensor:
+        key = self._keys(clip)
+        place, phase = (integers(key, draw) for draw in range(_FIRST_DRAW))
+        return self.sounds.seconds(clip.sound, place, phase)
 
 
 class _Noise:

@@ -39,6 +39,8 @@ class NoisyMicrophone(Microphone):
         Least and greatest signal-to-noise ratio, dB, -200 to 200.
     noises : sequence of str
         Kinds of noise: "white", and names of recordings of the package, see docs/sounds.md.
+    silent : float
+        Share of the clips without the sound, 0 to 1; their noise is as loud as with it.
     noise_rms, gain : float
         See `Microphone`.
 
@@ -53,6 +55,7 @@ class NoisyMicrophone(Microphone):
         level: Sequence[float] = (0.0, 0.0),
         snr: Sequence[float] = (10.0, 10.0),
         noises: Sequence[str] = (WHITE,),
+        silent: float = 0.0,
         noise_rms: float = 0.005,
         gain: float = 1.0,
     ) -> None:
@@ -62,6 +65,9 @@ class NoisyMicrophone(Microphone):
             _range("snr", snr),
             tuple(noises),
         )
+        if not 0 <= silent <= 1:
+            raise UserError(f"microphone.silent: {silent}; give a share, 0 to 1")
+        self.silent = silent
         if not self.noises:
             raise UserError(f"microphone.noises: empty; give at least one, such as {WHITE}")
         for name in self.noises:
@@ -79,6 +85,8 @@ class NoisyMicrophone(Microphone):
         )
         power = clips.square().mean((1, 2))
         scale = (power * 10 ** (-ratio / 10)).sqrt()
+        if self.silent:
+            clips *= (noise.uniform(4) >= self.silent)[:, None, None]
         clips += scale[:, None, None] * self._surroundings(noise, clips.shape[-1])
         # the level of the sound and of the noise around it, against that of the microphone's own
         clips *= 10 ** (level / 20)[:, None, None]

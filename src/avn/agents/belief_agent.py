@@ -44,7 +44,11 @@ class BeliefAgent(PlannerAgent):
         Probability from which it stops by "classifier", 0 to 1.
     confirm : bool
         Whether it turns until it has heard all four headings of a square before it stops there.
-    patience : float or None
+    least_information : float
+        Information of a direction of arrival, in nats, below which nothing counts as heard: the
+        difference of its entropy from that of a uniform distribution; 0 or more. Where it has heard
+        nothing yet, the agent turns.
+    stop_half_life : float or None
         Actions after which `stop_above` has halved, more than 0; None for never.
     **planner
         Other parameters of `PlannerAgent`, without those of its source filter.
@@ -58,7 +62,8 @@ class BeliefAgent(PlannerAgent):
         stop_above: float = 0.5,
         stop_at: float = 0.5,
         confirm: bool = True,
-        patience: float | None = None,
+        least_information: float = 0.0,
+        stop_half_life: float | None = None,
         **planner: Any,
     ) -> None:
         super().__init__(mapper, stop_at=stop_at, **planner)
@@ -67,9 +72,14 @@ class BeliefAgent(PlannerAgent):
         if not 0 < stop_above <= 1:
             raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and up to 1")
         self.model, self.stop_by, self.stop_above = model or ArrivalModel(), stop_by, stop_above
-        if patience is not None and not patience > 0:
-            raise UserError(f"planner.patience: {patience}; give actions, more than 0, or null")
-        self.confirm, self.patience = confirm, patience
+        if stop_half_life is not None and not stop_half_life > 0:
+            raise UserError(
+                f"planner.stop_half_life: {stop_half_life}; give actions, more than 0, or null"
+            )
+        if not least_information >= 0:
+            raise UserError(f"planner.least_information: {least_information}; give nats, 0 or more")
+        self.confirm, self.stop_half_life = confirm, stop_half_life
+        self.least_information = least_information
         self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
@@ -81,7 +91,7 @@ class BeliefAgent(PlannerAgent):
         """Return the settings of the source filter, and those of Stop that do not count."""
         classified = protocol.requires_stop and self.stop_by == "classifier"
         stop = () if protocol.requires_stop else ("stop_by", "confirm")
-        above = ("stop_above", "patience") if classified or not protocol.requires_stop else ()
+        above = ("stop_above", "stop_half_life") if classified or not protocol.requires_stop else ()
         return ("source_filter", "error", *stop, *above)
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
@@ -99,7 +109,8 @@ class BeliefAgent(PlannerAgent):
         belief = self._belief
         squares = heard.distance - torch.tensor([math.log(CELL), 0.0])
         self._actions += 1
-        belief.hear(pose, heard.bearing.numpy(), squares.numpy(), active)
+        audible = (information(heard) >= self.least_information).numpy()
+        belief.hear(pose, heard.bearing.numpy(), squares.numpy(), active, audible)
         if not (self.protocol.requires_stop and self.stop_by == "belief"):
             belief.rule_out(pose[:, :2], self._near, active)
         belief.score(graph.cost, active)
@@ -107,6 +118,12 @@ class BeliefAgent(PlannerAgent):
     def _targets(self, active: np.ndarray) -> np.ndarray:
         assert self._belief is not None
         return self._belief.targets(self.mapper.graph.cost, active)
+
+    def _planned(self, active: np.ndarray) -> Tensor:
+        """Return the first action of the shortest path; a turn for those who heard nothing."""
+        assert self._belief is not None
+        informed = torch.from_numpy(self._belief.informed())
+        return torch.where(informed, super()._planned(active), ROTATE_RIGHT)
 
     def _with_stops(self, observation: TensorDict, actions: Tensor) -> Tensor:
         stops = self._stops(observation)
@@ -123,9 +140,15 @@ class BeliefAgent(PlannerAgent):
         assert self._belief is not None
         position = self.mapper.pose[:, :2].numpy()
         enough = self.stop_above
-        if self.patience is not None:
-            enough *= 0.5 ** (self._actions / self.patience)
+        if self.stop_half_life is not None:
+            enough *= 0.5 ** (self._actions / self.stop_half_life)
         return torch.from_numpy(self._belief.near(position, self._goal) >= enough)
+
+
+def information(heard: Arrivals) -> Tensor:
+    """Return the information of directions of arrival in nats, (N,), 0 for a uniform one."""
+    entropy = -(heard.bearing.exp() * heard.bearing).sum(-1)
+    return (math.log(heard.bins) - entropy).clamp_min(0)
 
 
 def goal_offsets(protocol: Protocol) -> NDArray[np.int64]:

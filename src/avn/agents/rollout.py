@@ -17,6 +17,7 @@ from avn.core.actions import HEADINGS, action_error
 from avn.core.errors import UserError
 from avn.core.random import derive
 from avn.navigation.distances import actions_to_cells, fewest_actions
+from avn.navigation.dynamics import Dynamics
 from avn.navigation.episodes import Episodes
 from avn.navigation.metrics import sna, soft_spl, spl
 from avn.navigation.navigation_scene import NavigationScene
@@ -59,6 +60,7 @@ def rollout_scene(
     labels: Labels,
     observations: SceneObservations | None = None,
     watch: Watch | None = None,
+    dynamics: Dynamics | None = None,
 ) -> pd.DataFrame:
     """Run an agent in all episodes of a scene at once.
 
@@ -82,18 +84,21 @@ def rollout_scene(
     watch : callable, optional
         Called at each step; see `Watch`. If it ends the rollout early, the records of unfinished
         episodes are not valid.
+    dynamics : Dynamics, optional
+        What changes in the course of an episode; nothing by default.
 
     Returns
     -------
     DataFrame
-        One row for each episode, with the columns `avn.reporting.results.EPISODE_COLUMNS`.
+        One row for each episode, with the columns `avn.reporting.results.EPISODE_COLUMNS` and
+        those of what changes in the course of the episodes.
 
     Raises
     ------
     UserError
         If an observation or the exploration that the agent needs is missing.
     """
-    simulator = Simulator(scene, episodes, protocol, observations)
+    simulator = Simulator(scene, episodes, protocol, observations, dynamics)
     rollout(agent, simulator, watch)
     return records(simulator, labels)
 
@@ -203,7 +208,31 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
             "dtg": CELL * distances.source_moves[source, end],
             "sna_goal": sna(success, actions, fewest),
         }
+        | _course(simulator)
     )
+
+
+def _course(simulator: Simulator) -> dict[str, np.ndarray]:
+    """Return the columns of what changed in the course of the episodes; none if nothing did."""
+    course, dynamics = simulator.course, simulator.course.dynamics
+    found: dict[str, np.ndarray] = {}
+    if dynamics.schedule:
+        silent = simulator.success & (simulator.actions > course.end)
+        found["sound_begins"], found["sound_ends"] = course.begin.numpy(), course.end.numpy()
+        found["success_when_silent"] = silent.numpy().astype(np.int64)
+    if dynamics.distractor:
+        names = np.array(simulator.episodes.sounds, dtype=object)
+        found["distractor"] = course.other_source.numpy()
+        found["distractor_sound"] = names[course.other_sound.numpy()]
+        if simulator.protocol.requires_stop:
+            near = simulator.distances.goal[
+                found["distractor"], simulator.state.numpy() // HEADINGS
+            ]
+            found["stopped_at_distractor"] = (near & simulator.stopped.numpy()).astype(np.int64)
+    if dynamics.odometry:
+        found["slips"] = simulator.slips.numpy()
+        found["drift"] = CELL * simulator.drift().numpy()
+    return found
 
 
 def _fewest(simulator: Simulator) -> np.ndarray:

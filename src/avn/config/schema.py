@@ -163,6 +163,9 @@ class CoreConfig:
     split: SplitConfig = MISSING
     acoustics: AcousticsConfig = MISSING
     microphone: Option = MISSING
+    schedule: Option = MISSING
+    distractor: Option = MISSING
+    odometry: Option = MISSING
     sound: dict[str, str] = MISSING
     training: TrainingConfig = field(default_factory=TrainingConfig)
     sound_model: NamedOption = MISSING
@@ -248,6 +251,9 @@ BASES: dict[str, type] = {
     "protocol": NamedOption,
     "algorithm": AlgorithmOption,
     "microphone": Option,
+    "schedule": Option,
+    "distractor": Option,
+    "odometry": Option,
     "renderer": RendererConfig,
     "backbone": BackboneConfig,
 }
@@ -262,6 +268,9 @@ INTERFACES = {
     "protocol": "avn.navigation.protocols.Protocol",
     "algorithm": "avn.rl.algorithm.Algorithm",
     "microphone": "avn.acoustics.microphone.Microphone",
+    "schedule": "avn.navigation.schedule.Schedule",
+    "distractor": "avn.navigation.distractor.Distractor",
+    "odometry": "avn.navigation.odometry_noise.OdometryNoise",
     "renderer": "avn.views.renderer.Renderer",
     "backbone": "avn.views.backbone.Backbone",
 }
@@ -271,6 +280,7 @@ GIVEN = {
     "stop_model": ("rate",),
     "occupancy_model": ("camera",),
     "planner": ("mapper", "oracle_inputs", "stop_at"),
+    "distractor": ("categories",),
     "baseline": ("network", "hears", "maps", "map_size"),
     # of the submodule of a network under this key
     "spectrogram": ("rate",),

@@ -9,6 +9,7 @@ from typing import Protocol
 from torch import Tensor
 
 from avn.core.clip_id import ClipId
+from avn.core.sound_mix import SoundMix
 
 
 class RenderedAudio(Protocol):
@@ -32,7 +33,7 @@ class RenderedAudio(Protocol):
     def shape(self) -> tuple[int, ...]:
         """Shape of the observation of one clip."""
 
-    def __call__(self, clip: ClipId) -> Tensor:
+    def __call__(self, clip: ClipId, mix: SoundMix | None = None) -> Tensor:
         """Render N clips, (N, ...) float32; sources and states are those of the apartment."""
 
 

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from avn.core.actions import ACTIONS, BACKWARD, HEADINGS, transitions
 from avn.core.clip_id import ClipId
+from avn.core.sound_mix import SoundMix
 from avn.navigation.distances import measure
 from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.observations import RenderedAudio, SceneObservations
@@ -102,7 +103,9 @@ class SceneBatch:
         """Return the number of the first source of each apartment, (R,) int64."""
         return torch.searchsorted(self.source_scene, torch.arange(len(self.first_state) - 1))
 
-    def render(self, clip: ClipId, wanted: Tensor | None = None) -> dict[str, Tensor]:
+    def render(
+        self, clip: ClipId, wanted: Tensor | None = None, mix: SoundMix | None = None
+    ) -> dict[str, Tensor]:
         """Render the audio observations that are in no table.
 
         Parameters
@@ -111,6 +114,9 @@ class SceneBatch:
             Clips of N agents.
         wanted : (N,) bool tensor, optional
             Agents that hear; the observations of the others are 0.
+        mix : SoundMix, optional
+            What the agents hear besides the steady sound of their source; its sources are those
+            of the agent's apartment.
 
         Returns
         -------
@@ -131,7 +137,7 @@ class SceneBatch:
                 local = source - first_source[number], state - self.first_state[number]
                 own = ClipId(*local, *others)
                 for name, each in self.rendered.items():
-                    found[name][rows] = each[number](own)
+                    found[name][rows] = each[number](own, mix and mix.rows(rows))
         return found
 
     def origin(self, start: Tensor) -> tuple[Tensor, Tensor]:

@@ -9,13 +9,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from avn.core.actions import BACKWARD, action_error
+from avn.core.actions import ACTIONS, BACKWARD, STOP, action_error
 from avn.core.clip_id import ClipId
 from avn.core.random import scramble
 from avn.navigation.distances import Distances, measure
+from avn.navigation.dynamics import Course, Dynamics
 from avn.navigation.episodes import Episodes
 from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.observations import SceneObservations
+from avn.navigation.odometry_noise import reckoned
 from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import advance, build_scene_batch
 
@@ -40,13 +42,18 @@ class Simulator:
     observations : SceneObservations, optional
         Audio and visual observations of the scene. The realisation of a clip at a step is a
         function of the seed, the episode and the number of actions, for every agent.
+    dynamics : Dynamics, optional
+        What changes in the course of an episode; nothing by default.
 
     Attributes
     ----------
     state, source, sound : (N,) int64
         State of each agent, and its source and sound; for privileged agents and records only.
-    attempted, moves, collisions, actions : (N,) int64
-        Attempted moves, moves made, blocked moves, and all actions including Stop.
+    attempted, moves, collisions, slips, actions : (N,) int64
+        Attempted moves, moves made, blocked moves, moves that slipped, and all actions including
+        Stop.
+    course : Course
+        What changes in the course of each episode.
     max_attempts : (N,) int64
         Attempted moves that end the episode.
     success, stopped, done : (N,) bool
@@ -56,6 +63,8 @@ class Simulator:
     ------
     ValueError
         If an observation has another shape than the scene.
+    UserError
+        If the apartment has no place for a distractor, or the episodes no sound for it.
     """
 
     def __init__(
@@ -64,6 +73,7 @@ class Simulator:
         episodes: Episodes,
         protocol: Protocol,
         observations: SceneObservations | None = None,
+        dynamics: Dynamics | None = None,
     ) -> None:
         self.scene = scene
         self.episodes = episodes
@@ -77,6 +87,7 @@ class Simulator:
         if observed.sounds not in (None, sounds):
             raise ValueError(f"clips of {observed.sounds} sounds, but episodes of {sounds}")
         self.tables = build_scene_batch([scene], protocol, [observed], sounds)
+        self.course = Course(dynamics or Dynamics(), episodes, len(scene.sources))
         self._goal_row = self.tables.goal_row[self.source]
         self._origin = self.tables.origin(self.start)
         self.max_attempts = self.tables.most_moves[self._goal_row + self.start]
@@ -90,15 +101,16 @@ class Simulator:
     @property
     def moves(self) -> Tensor:
         """Number of moves made, (N,) int64."""
-        return self.attempted - self.collisions
+        return self.attempted - self.collisions - self.slips
 
     def reset(self) -> TensorDict:
         """Put every agent back to its start, and return the first observation."""
         count = len(self)
         self.state = self.start.clone()
-        self.attempted, self.collisions, self.actions = (
-            torch.zeros(count, dtype=torch.int64) for _ in range(3)
+        self.attempted, self.collisions, self.slips, self.actions = (
+            torch.zeros(count, dtype=torch.int64) for _ in range(4)
         )
+        self._reckoned = torch.zeros(count, 3, dtype=torch.int64)
         self.success, self.stopped, self.done, self._collided = (
             torch.zeros(count, dtype=torch.bool) for _ in range(4)
         )
@@ -125,9 +137,18 @@ class Simulator:
         """
         self._check(actions)
         running = ~self.done
-        reached, blocked, arrived = advance(self.tables, self._goal_row, self.state, actions)
-        self.state = torch.where(running, reached, self.state)
-        self.attempted += (actions <= BACKWARD) & running
+        slips, twice = self.course.carried_out(actions, self.actions)
+        # without effect, as Stop
+        effective = torch.where(slips, STOP, actions)
+        reached, blocked, arrived = advance(self.tables, self._goal_row, self.state, effective)
+        again = self.tables.following[reached * ACTIONS + actions]
+        self.state = torch.where(running, torch.where(twice, again, reached), self.state)
+        self._reckoned = torch.where(
+            running[:, None], reckoned(self._reckoned, actions, blocked), self._reckoned
+        )
+        moves = (actions <= BACKWARD) & running
+        self.attempted += moves
+        self.slips += slips & moves
         self.collisions += blocked & running
         self.actions += running
         self._collided = torch.where(running, blocked, self._collided)
@@ -152,15 +173,27 @@ class Simulator:
         """
         from tensordict import TensorDict
 
-        odometry = self.tables.odometry(self.start, self.state, self._origin)
+        odometry = self.odometry()
         observation = {"collided": self._collided.clone(), "odometry": odometry}
         if self.tables.audio or self.tables.rendered:
             heard = self.clip()
             row = self.tables.clip(heard)
             observation |= {name: table[row] for name, table in self.tables.audio.items()}
-            observation |= self.tables.render(heard, ~self.done)
+            mix = self.course.mix(self.actions)
+            observation |= self.tables.render(heard, ~self.done, mix)
         observation |= {name: seen[self.state] for name, seen in self.tables.visual.items()}
         return TensorDict(observation, batch_size=[len(self)])
+
+    def odometry(self) -> Tensor:
+        """Return the pose of each agent relative to its start, as it counts it, (N, 3) int64."""
+        if self.course.dynamics.odometry:
+            return self._reckoned.clone()
+        return self.tables.odometry(self.start, self.state, self._origin)
+
+    def drift(self) -> Tensor:
+        """Return the distance between each agent and where its odometry places it, cells, (N,)."""
+        true = self.tables.odometry(self.start, self.state, self._origin)
+        return (self.odometry() - true)[:, :2].double().norm(dim=1)
 
     def observe_exploration(self) -> tuple[TensorDict, Tensor]:
         """Return the observations along the exploration trajectories, without audio.

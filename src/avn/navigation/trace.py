@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.actions import HEADINGS
+from avn.core.sound_mix import SoundMix
 from avn.navigation.navigation_scene import NavigationScene
 
 
@@ -64,6 +65,9 @@ class Trace:
         Beliefs of an agent with a map.
     exploration_trajectory : (W,) int64, or None
         States of the exploration trajectory of an agent that explores.
+    mix : SoundMix, or None
+        When the source sounds in each of the T + 1 seconds, and the distractor; None for the
+        steady sound of the source.
     """
 
     scene: NavigationScene
@@ -77,6 +81,7 @@ class Trace:
     source_estimates: NDArray[np.float64] | None
     beliefs: BeliefTrace | None
     exploration_trajectory: NDArray[np.int64] | None
+    mix: SoundMix | None = None
 
     @property
     def path(self) -> NDArray[np.float64]:

@@ -12,16 +12,17 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from avn.acoustics.counter_hash import absorb
 from avn.core.clip_id import ClipId
 from avn.core.prefetch import prefetch, threads_for_one_operation
+from avn.core.sound_mix import SoundMix
 from avn.pipeline.audio_inference import AudioInference
-from avn.pipeline.rendered_audio import RenderedClips, Waveforms
+from avn.pipeline.rendered_audio import RenderedClips, Waveforms, batches
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.stage import Stage
 
 # Clips computed at once, for the caches of a CPU.
 _BATCH = 32
-_STATES = 1 << 24  # more than an apartment has
 
 
 class LiveInference(Waveforms):
@@ -87,30 +88,35 @@ class RememberedClips(RenderedClips):
         self._keys = torch.empty(0, dtype=torch.int64)
         self._outputs = torch.empty(0, *self.shape)
 
-    def __call__(self, clip: ClipId) -> Tensor:
+    def __call__(self, clip: ClipId, mix: SoundMix | None = None) -> Tensor:
         """Return the outputs of N clips, (N, ...) float32."""
-        keys = self._key(clip)
+        mix = mix and mix.clipped(self.memory)
+        keys = _keys(clip, mix)
         known = torch.isin(keys, self._keys)
         if not known.all():
             new, first = _first_of_each(keys[~known])
             rows = (~known).nonzero()[:, 0][first]
-            heard = self._computed(ClipId(*(part[rows] for part in clip)))
+            heard = self._computed(ClipId(*(part[rows] for part in clip)), mix and mix.rows(rows))
             order = torch.cat((self._keys, new)).argsort()
             self._keys = torch.cat((self._keys, new))[order]
             self._outputs = torch.cat((self._outputs, heard))[order]
         return self._outputs[torch.searchsorted(self._keys, keys)]
 
-    def _key(self, clip: ClipId) -> Tensor:
-        pair = clip.source * _STATES + clip.state
-        return (pair * self.sounds + clip.sound) * self.realisations + clip.realisation
-
-    def _computed(self, clip: ClipId) -> Tensor:
-        parts = [ClipId(*parts) for parts in zip(*(p.split(_BATCH) for p in clip), strict=True)]
+    def _computed(self, clip: ClipId, mix: SoundMix | None) -> Tensor:
+        parts = batches(clip, mix, _BATCH)
         threads = torch.get_num_threads()
         with threads_for_one_operation(1):
             if len(parts) == 1:
-                return self._rendered(parts[0])
-            return torch.cat([*prefetch(self._rendered, parts, threads)])
+                return self._rendered(*parts[0])
+            return torch.cat([*prefetch(lambda part: self._rendered(*part), parts, threads)])
+
+
+def _keys(clip: ClipId, mix: SoundMix | None) -> Tensor:
+    """Return a key of 64 bits for each clip, (N,) int64."""
+    words = [*clip]
+    if mix is not None:
+        words += [part.view(torch.int64) for part in mix]
+    return absorb(torch.zeros((), dtype=torch.int64), torch.stack(words, dim=-1))
 
 
 def _first_of_each(keys: Tensor) -> tuple[Tensor, Tensor]:

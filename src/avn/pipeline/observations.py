@@ -22,6 +22,7 @@ from avn.pipeline.apartments import TEST, Apartments
 from avn.pipeline.arrivals import ArrivalEstimates
 from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
+from avn.pipeline.dynamics import changing
 from avn.pipeline.live_audio import LiveInference
 from avn.pipeline.occupancy import LocalPatches, has_occupancy_model, true_local_patches
 from avn.pipeline.rendered_audio import Spectrograms, Waveforms
@@ -212,8 +213,14 @@ class Observed:
         self.apartments, self.cfg = apartments, apartments.cfg
         self.names = [name for name in OBSERVATIONS if name in set(names)]
         self.clips, self._truth = clips or Clips(), truth
-        # each clip is heard in few episodes with one sound each
-        self._live = apartments.world == TEST and self.cfg.get("episodes") == ONE_SOUND
+        # each clip is heard in few episodes with one sound each, or is in no table of steady sounds
+        rare = self.cfg.get("episodes") == ONE_SOUND or self.mixed
+        self._live = apartments.world == TEST and rare
+
+    @property
+    def mixed(self) -> bool:
+        """Whether sounds begin or end in an episode, or are heard with another one."""
+        return bool({"schedule", "distractor"} & {*changing(self.cfg)})
 
     def is_true(self, name: str) -> bool:
         """Return whether an observation is ground truth."""
@@ -247,6 +254,11 @@ class Observed:
             if shown and not set(shown) & set(wanted):
                 raise UserError(
                     f"agent.oracle_inputs: '{truth}' is nothing that agent {agent} observes"
+                )
+            if self.mixed and any(OBSERVATIONS[name].audio for name in shown):
+                raise UserError(
+                    f"agent.oracle_inputs: '{truth}' is known of steady sounds alone; take "
+                    "schedule=continuous and distractor=none"
                 )
         for name in wanted:
             start = f"agent {agent} needs the observation '{name}'"

@@ -10,20 +10,18 @@ from numpy.typing import NDArray
 from omegaconf import DictConfig
 from torch import Tensor
 
-from avn.acoustics.clips import ClipRenderer, brir_spectra, fade_samples
+from avn.acoustics.clips import ClipRenderer, fade_samples
 from avn.core.classes import build_object
 from avn.core.clip_id import ClipId
 from avn.navigation.trace import Trace
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import Clips
+from avn.pipeline.rendered_audio import RenderedClips
 from avn.pipeline.replay import Run
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds
 from avn.pipeline.stage import build
 from avn.pipeline.views import RenderedViews
-
-# Clips rendered at once.
-_BATCH = 64
 
 
 def observed_stages(cfg: DictConfig) -> tuple[DirectSound, RenderedViews]:
@@ -52,9 +50,12 @@ class RunObservations:
         self._views = dict(zip(self._scenes, (views.rgb for views in rendered.load()), strict=True))
         # the clips of `SourceEstimates`: same microphone, seed and purpose
         clips, microphone = Clips(), build_object("microphone", cfg.microphone)
-        self._renderer = ClipRenderer(
-            dry_sounds(cfg), microphone, clips.seed_of(cfg), clips.purpose
-        )
+        renderer = ClipRenderer(dry_sounds(cfg), microphone, clips.seed_of(cfg), clips.purpose)
+        shape = 2, renderer.sounds.rate
+        self._clips = {
+            name: RenderedClips(scene, renderer, cfg.realisations, lambda clips: clips, shape)
+            for name, scene in self._scenes.items()
+        }
 
     def views(self, scene: str, states: Sequence[int] | NDArray[np.int64]) -> NDArray[np.uint8]:
         """Return first-person views of some states of a scene, (N, H, W, 3) uint8."""
@@ -62,19 +63,10 @@ class RunObservations:
 
     def clips(self, trace: Trace) -> Tensor:
         """Return the clip of each step, (T + 1, 2, rate) float32, left and right ear."""
-        brirs = self._scenes[trace.scene.name].brirs
         state, realisation = torch.from_numpy(trace.state), torch.from_numpy(trace.realisation)
-        parts = []
-        for states, realisations in zip(
-            state.split(_BATCH), realisation.split(_BATCH), strict=True
-        ):
-            source = torch.full_like(states, trace.source)
-            sound = torch.full_like(states, trace.sound)
-            spectra = brir_spectra(brirs.gather(source, states), self._renderer.sounds.rate)
-            parts.append(
-                self._renderer.render(spectra, ClipId(source, states, sound, realisations))
-            )
-        return torch.cat(parts)
+        source, sound = (torch.full_like(state, own) for own in (trace.source, trace.sound))
+        clip = ClipId(source, state, sound, realisation)
+        return self._clips[trace.scene.name](clip, trace.mix)
 
 
 def soundtrack(clips: Tensor) -> NDArray[np.float32]:

@@ -54,7 +54,7 @@ def write(
         results.write_csv(
             _source_estimates(cfg, scenes, source_estimates), folder / SOURCE_ESTIMATES
         )
-    if "arrival" in stages:
+    if "arrival" in stages and not cfg.distractor._target_:
         acoustics = acoustics_of(observed.apartments)
         results.write_csv(errors_by_scene(scenes, observations, acoustics), folder / ARRIVALS)
     if "local_patch" in stages:

@@ -18,6 +18,7 @@ from avn.acoustics.clips import ClipRenderer, brir_spectra
 from avn.core.classes import build_object, build_part
 from avn.core.clip_id import ClipId
 from avn.core.settings import plain
+from avn.core.sound_mix import SoundMix
 from avn.dataset.scene import AudibleScene
 from avn.modules.spectrogram import Spectrogram
 from avn.pipeline.apartments import Apartments
@@ -187,16 +188,44 @@ class RenderedClips:
         return self._shape
 
     @torch.no_grad()
-    def __call__(self, clip: ClipId) -> Tensor:
+    def __call__(self, clip: ClipId, mix: SoundMix | None = None) -> Tensor:
         """Render N clips, (N, ...) float32."""
-        return torch.cat(
-            [
-                self._rendered(ClipId(*parts))
-                for parts in zip(*(part.split(_BATCH) for part in clip), strict=True)
-            ]
-        )
+        return torch.cat([self._rendered(*part) for part in batches(clip, mix, _BATCH)])
 
-    def _rendered(self, clip: ClipId) -> Tensor:
+    def _rendered(self, clip: ClipId, mix: SoundMix | None = None) -> Tensor:
+        return self._output(self._renderer.record(self.at_ears(clip, mix), clip))
+
+    def at_ears(self, clip: ClipId, mix: SoundMix | None = None) -> Tensor:
+        """Return the sound at the ears, without microphones, (N, 2, rate) float32."""
+        renderer, rate = self._renderer, self._renderer.sounds.rate
         brirs = self._brirs.gather(clip.source, clip.state)
-        spectra = brir_spectra(brirs, self._renderer.sounds.rate)
-        return self._output(self._renderer.render(spectra, clip))
+        found = renderer.at_ears(brir_spectra(brirs, rate), clip)
+        if mix is None:
+            return found
+        mix = mix.clipped(self.memory)
+        switched = ((mix.begin > -self.memory) | (mix.end < 1)).nonzero()[:, 0]
+        if len(switched):
+            own = ClipId(*(part[switched] for part in clip))
+            ends = mix.begin[switched], mix.end[switched]
+            found[switched] = renderer.between(brirs[switched], own, *ends)
+        both = (mix.other_source >= 0).nonzero()[:, 0]
+        if len(both):
+            own = ClipId(*(part[both] for part in clip))
+            other = own._replace(source=mix.other_source[both], sound=mix.other_sound[both])
+            spectra = brir_spectra(self._brirs.gather(other.source, other.state), rate)
+            found[both] += renderer.at_ears(spectra, other)
+        return found
+
+    @property
+    def memory(self) -> float:
+        """Whole seconds for which a sound is heard after its end."""
+        return float(-(-self._brirs.samples // self._renderer.sounds.rate))
+
+
+def batches(clip: ClipId, mix: SoundMix | None, size: int) -> list[tuple[ClipId, SoundMix | None]]:
+    """Split clips into batches."""
+    clips = [ClipId(*parts) for parts in zip(*(p.split(size) for p in clip), strict=True)]
+    if mix is None:
+        return [(own, None) for own in clips]
+    mixes = [SoundMix(*parts) for parts in zip(*(p.split(size) for p in mix), strict=True)]
+    return [*zip(clips, mixes, strict=True)]

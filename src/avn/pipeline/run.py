@@ -39,6 +39,7 @@ from avn.pipeline.agent import (
     check_agent,
 )
 from avn.pipeline.apartments import Apartments
+from avn.pipeline.dynamics import build_dynamics, changing
 from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import learns
@@ -102,6 +103,7 @@ class Evaluation(Stage):
             "acoustics.name",
             *agent_settings(self.cfg),
             *self.observed.settings,
+            *changing(self.cfg),
         )
 
     def ignored(self) -> Sequence[str]:
@@ -175,6 +177,7 @@ class Evaluation(Stage):
                 "no exploration walk; take episodes=frozen and protocol.exploration_steps=400"
             )
         check_agent(cfg, agent)
+        build_dynamics(cfg)
         dry_sounds(cfg)  # a bad file is refused before anything is made
 
     def done(self) -> bool:
@@ -225,7 +228,7 @@ def rollout_scenes(
         Records of each scene.
     """
     protocol: Protocol = build_object("protocol", cfg.protocol)
-    agent = build_agent(cfg, ready=True)
+    agent, dynamics = build_agent(cfg, ready=True), build_dynamics(cfg)
     labels = Labels(
         agent=agent_label(cfg),
         acoustics=cfg.acoustics.name,
@@ -236,7 +239,9 @@ def rollout_scenes(
     with progress_bar(f"walking of '{labels.agent}'", total, "episodes") as advance:
         return [
             rollout_scene(
-                agent, scene, own, protocol, labels, observed, watch or _counting(advance)
+                *(agent, scene, own, protocol, labels, observed),
+                watch=watch or _counting(advance),
+                dynamics=dynamics,
             )
             for scene, own, observed in zip(scenes, episodes, observations, strict=True)
         ]

@@ -50,7 +50,10 @@ class ArrivalBelief(Searched):
         super().__init__(n, size)
         self.model, self.bins, slots = model, bins, model.places
         self.log_belief = np.zeros((n, size, size), dtype=np.float32)
-        # a ring of places for each agent, and the place where it is now
+        # where each agent is, and the headings with which it has listened there
+        self._here = np.full((n, 2), -1, dtype=np.int64)
+        self._headings = np.zeros((n, HEADINGS), dtype=np.bool_)
+        # a ring of places for each agent, and the newest of them
         self._newest = np.zeros(n, dtype=np.int64)
         self._position = np.full((n, slots, 2), -1, dtype=np.int64)
         self._weight = np.zeros((n, slots), dtype=np.float32)
@@ -70,6 +73,7 @@ class ArrivalBelief(Searched):
         bearing: NDArray[np.float32],
         distance: NDArray[np.float32],
         active: NDArray[np.bool_],
+        audible: NDArray[np.bool_] | None = None,
     ) -> None:
         """Add what was heard now.
 
@@ -83,8 +87,12 @@ class ArrivalBelief(Searched):
             Mean and standard deviation of the natural logarithm of the path's length in squares.
         active : (N,) bool
             Agents to update.
+        audible : (N,) bool, optional
+            Agents that heard something; all by default. The evidence of the others is not
+            forgotten as they walk.
         """
-        rows = np.flatnonzero(active)
+        self._see(pose, active)
+        rows = np.flatnonzero(active if audible is None else active & audible)
         here = self._position[rows, self._newest[rows]]
         moved = rows[(here != pose[rows, :2]).any(1)]
         self._newest[moved] = (self._newest[moved] + 1) % self.model.places
@@ -100,6 +108,13 @@ class ArrivalBelief(Searched):
         self._bearing[heard] += np.take_along_axis(bearing[rows], turned, 1)
         self._distance[heard] += distance[rows]
         self._count[heard] += 1
+
+    def _see(self, pose: NDArray[np.int64], active: NDArray[np.bool_]) -> None:
+        """Note where the agents are, and the headings that they had there."""
+        moved = active & (self._here != pose[:, :2]).any(1)
+        self._headings[moved] = False
+        self._here[active] = pose[active, :2]
+        self._headings[active, pose[active, 2]] = True
 
     def score(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> None:
         """Compute the posterior on the graphs of now.
@@ -135,14 +150,13 @@ class ArrivalBelief(Searched):
         log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))
         bearing[row, slot] = self._bearing_terms(row, slot)
         log_length[row, slot], precision[row, slot] = self._length_terms(row, slot)
-        position = self._position[np.arange(len(cost)), self._newest]
         _score(
             self.log_belief,
             cost,
             self.searched,
             active,
             kept,
-            position,
+            self._here,
             self.model.reach,
             self.model.bias,
             (self._length, self._direction),
@@ -189,9 +203,12 @@ class ArrivalBelief(Searched):
         return np.stack((best % cost.shape[1], best // cost.shape[1]), 1)
 
     def heard_around(self) -> NDArray[np.bool_]:
-        """Return whether each agent has heard all four headings where it is, (N,)."""
-        count = self._count[np.arange(len(self._newest)), self._newest]
-        return np.asarray((count > 0).all(1))
+        """Return whether each agent has listened with all four headings where it is, (N,)."""
+        return np.asarray(self._headings.all(1))
+
+    def informed(self) -> NDArray[np.bool_]:
+        """Return whether each agent has heard anything, (N,)."""
+        return np.asarray((self._weight > _LEAST_WEIGHT).any(1))
 
     def near(self, position: NDArray[np.int64], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the probability that the source is at some offsets from each agent, (N,).

@@ -52,9 +52,10 @@ def read_episodes(folder: Path) -> pd.DataFrame:
             f"{folder}: an earlier version of avn made the run, {EPISODE_RECORDS} has no "
             f"{', '.join(lacking)}; delete the folder and run again"
         )
-    ends = list(results.INTERVALS)
+    metrics = results.metrics_of(episodes)
+    ends = [f"{metric}_{end}" for metric in metrics for end in ("low", "high")]
     try:
-        if episodes[list(results.METRICS.values())].isna().any(axis=None):
+        if episodes[list(metrics.values())].isna().any(axis=None):
             raise ValueError("a metric is missing")
         summary = results.summarise(episodes, draws=0)
         pd.testing.assert_frame_equal(runs.drop(columns=ends), summary.drop(columns=ends))

@@ -28,6 +28,14 @@ EPISODE_COLUMNS = (
 METRICS = {"sr": "success"} | {name: name for name in ("spl", "softspl", "sna", "dtg", "sna_goal")}
 INTERVALS = tuple(f"{metric}_{end}" for metric in METRICS for end in ("low", "high"))
 RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *METRICS, *INTERVALS)
+# Metrics of worlds that change in the course of an episode, and their columns of episodes.csv:
+# success after the sound has ended, Stop at the distractor (rates), and the error of the odometry
+# at the end in metres.
+DYNAMIC_METRICS = {
+    "sws": "success_when_silent",
+    "dsr": "stopped_at_distractor",
+    "drift": "drift",
+}
 ALL_SOUNDS = "all"
 AVERAGE = "average"
 NO_INTERVAL = (
@@ -54,10 +62,11 @@ def summarise(episodes: pd.DataFrame, draws: int = DRAWS) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `RESULT_COLUMNS`. Scene `average` is the unweighted mean over scenes, as in the
-        paper. Sound `all` pools the episodes of all sounds if there are several. Intervals are
-        95 % intervals of `avn.reporting.bootstrap`, NaN where there are too few apartments: those
-        of `average` are for new apartments, those of a scene for new sources in it.
+        Columns `RESULT_COLUMNS`, and those of the `DYNAMIC_METRICS` of the records. Scene
+        `average` is the unweighted mean over scenes, as in the paper. Sound `all` pools the
+        episodes of all sounds if there are several. Intervals are 95 % intervals of
+        `avn.reporting.bootstrap`, NaN where there are too few apartments: those of `average` are
+        for new apartments, those of a scene for new sources in it.
 
     Raises
     ------
@@ -71,7 +80,14 @@ def summarise(episodes: pd.DataFrame, draws: int = DRAWS) -> pd.DataFrame:
         labels = dict(zip((*LABELS, "seed"), keys, strict=True))
         for cell, part in _cells(run):
             rows.append(labels | cell | {"episodes": len(part)} | _metrics(part, draws))
-    return pd.DataFrame(rows, columns=list(RESULT_COLUMNS))
+    others = [name for name in rows[0] if name not in RESULT_COLUMNS]
+    return pd.DataFrame(rows, columns=[*RESULT_COLUMNS, *others])
+
+
+def metrics_of(episodes: pd.DataFrame) -> dict[str, str]:
+    """Return the metrics of records, each with the column that it is the mean of."""
+    others = DYNAMIC_METRICS.items()
+    return METRICS | {name: column for name, column in others if column in episodes}
 
 
 def _cells(run: pd.DataFrame) -> Iterator[tuple[dict[str, str], pd.DataFrame]]:
@@ -86,11 +102,13 @@ def _cells(run: pd.DataFrame) -> Iterator[tuple[dict[str, str], pd.DataFrame]]:
 
 
 def _metrics(episodes: pd.DataFrame, draws: int) -> dict[str, float]:
-    columns = list(METRICS.values())
-    found = estimate(nested(episodes, columns), draws=draws)
-    ends = np.stack((found.low, found.high), axis=1).reshape(-1)
-    metrics = dict(zip(METRICS, found.mean.tolist(), strict=True))
-    return metrics | dict(zip(INTERVALS, ends.tolist(), strict=True))
+    metrics = metrics_of(episodes)
+    found = estimate(nested(episodes, [*metrics.values()]), draws=draws)
+    ends = np.stack((found.low, found.high), axis=1)
+    values = dict(zip(metrics, found.mean.tolist(), strict=True))
+    for metric, (low, high) in zip(metrics, ends.tolist(), strict=True):
+        values |= {f"{metric}_low": low, f"{metric}_high": high}
+    return values
 
 
 def headline(results: pd.DataFrame) -> dict[str, float]:
@@ -148,12 +166,13 @@ def across_runs(episodes: pd.DataFrame, draws: int = DRAWS) -> pd.DataFrame:
 
 def _spread(episodes: pd.DataFrame, key: str, name: str) -> dict[str, float]:
     """Compute the standard deviations of the metrics between the values of a column."""
-    columns = list(METRICS.values())
+    metrics = metrics_of(episodes)
+    columns = list(metrics.values())
     if key not in episodes:
-        return {f"{metric}_{name}": np.nan for metric in METRICS}
+        return {f"{metric}_{name}": np.nan for metric in metrics}
     means = episodes.groupby([key, "scene"])[columns].mean().groupby(key).mean()
     spread = means.std(ddof=1).tolist()
-    return {f"{metric}_{name}": own for metric, own in zip(METRICS, spread, strict=True)}
+    return {f"{metric}_{name}": own for metric, own in zip(metrics, spread, strict=True)}
 
 
 def shown_scenes(results: pd.DataFrame) -> list[str]:

@@ -1,0 +1,50 @@
+"""What a second of sound is made of besides the steady sound of one source."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+
+class SoundMix(NamedTuple):
+    """When the source of N agents sounds within a second, and what else sounds.
+
+    Attributes
+    ----------
+    begin, end : (N,) float64 tensor
+        Seconds, relative to the beginning of the second, between which the source emits sound; a
+        source that has always sounded began at minus infinity.
+    other_source, other_sound : (N,) int64 tensor
+        Index of a second source that sounds all the time, and of its recording; -1 for none.
+    """
+
+    begin: Tensor
+    end: Tensor
+    other_source: Tensor
+    other_sound: Tensor
+
+    @classmethod
+    def steady(cls, n: int) -> SoundMix:
+        """Return the mix of N agents whose only source sounds all the time."""
+        ends = torch.full((2, n), math.inf, dtype=torch.float64)
+        none = torch.full((2, n), -1)
+        return cls(-ends[0], ends[1], none[0], none[1])
+
+    def clipped(self, memory: float) -> SoundMix:
+        """Return the mix that sounds the same, with the least different beginnings and ends.
+
+        Parameters
+        ----------
+        memory : float
+            Seconds after which a sound has decayed.
+        """
+        begin, end = self.begin.clamp(-memory, 1.0), self.end.clamp(-memory, 1.0)
+        silent = begin >= end
+        return self._replace(begin=begin.masked_fill(silent, 0.0), end=end.masked_fill(silent, 0.0))
+
+    def rows(self, rows: Tensor) -> SoundMix:
+        """Return the mix of some agents."""
+        return SoundMix(*(part[rows] for part in self))

@@ -1,0 +1,71 @@
+"""Second source, of another category of sound, that sounds elsewhere in the apartment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from avn.core.errors import UserError
+from avn.core.random import scramble
+
+
+class Distractor:
+    """Second source at another source's place, with another sound of the test world.
+
+    It sounds all the time and as loud as the goal. Place and sound are drawn for each episode;
+    the category of the sound is another one than the goal's.
+
+    Parameters
+    ----------
+    categories : mapping of str to str
+        Category of each sound of the test world by name.
+    """
+
+    def __init__(self, categories: Mapping[str, str]) -> None:
+        self.categories = dict(categories)
+
+    def draw(
+        self,
+        keys: NDArray[np.uint64],
+        source: NDArray[np.int64],
+        sound: NDArray[np.int64],
+        sources: int,
+        sounds: Sequence[str],
+    ) -> tuple[Tensor, Tensor]:
+        """Draw source and sound of the distractors of N episodes, (N,) int64 each.
+
+        Parameters
+        ----------
+        keys : (N,) uint64
+            Key of each episode's random numbers.
+        source, sound : (N,) int64
+            Source and sound of the goals.
+        sources : int
+            Number of sources of the apartment.
+        sounds : sequence of str
+            Names of the sounds.
+
+        Raises
+        ------
+        UserError
+            If the apartment has one source, or all sounds have one category.
+        """
+        if sources < 2:
+            raise UserError("distractor: an apartment has one source and no place for a second")
+        categories = np.array([self.categories[name] for name in sounds])
+        other_category = categories[:, None] != categories[None, :]
+        if not other_category.any(1).all():
+            raise UserError(
+                "distractor: all sounds are of one category; give sounds of several, such as "
+                "sound=unheard"
+            )
+        step = 1 + (scramble(keys, 0) % np.uint64(sources - 1)).astype(np.int64)
+        # the n-th of the sounds of another category
+        count = other_category.sum(1)[sound].astype(np.uint64)
+        order = np.argsort(~other_category, axis=1, kind="stable")
+        other = order[sound, (scramble(keys, 1) % count).astype(np.int64)]
+        return torch.from_numpy((source + step) % sources), torch.from_numpy(other)

@@ -1,0 +1,40 @@
+"""What changes in the course of an episode, by the config."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from omegaconf import DictConfig
+
+from avn.acoustics.sound_table import packaged_sounds
+from avn.core.classes import build_object
+from avn.navigation.dynamics import Dynamics
+from avn.pipeline.sounds import sound_files
+
+# Groups of the config, as the attributes of `Dynamics`.
+GROUPS = ("schedule", "distractor", "odometry")
+
+
+def changing(cfg: DictConfig) -> tuple[str, ...]:
+    """Return the groups by which something changes in the course of an episode."""
+    return tuple(group for group in GROUPS if cfg[group]._target_)
+
+
+def build_dynamics(cfg: DictConfig) -> Dynamics:
+    """Build what changes in the course of an episode; raise `UserError` for an invalid setting."""
+    given: dict[str, dict[str, Any]] = {"distractor": {"categories": _categories(cfg)}}
+    return Dynamics(
+        **{
+            group: build_object(group, cfg[group], **given.get(group, {}))
+            for group in changing(cfg)
+        }
+    )
+
+
+def _categories(cfg: DictConfig) -> dict[str, str]:
+    """Return the category of each sound; a file of the user is a category of its own."""
+    table = packaged_sounds()
+    return {
+        name: table[path].category if path in table else name
+        for name, path in sound_files(cfg).items()
+    }
