@@ -60,6 +60,15 @@ def test_levels_and_ratios_are_spread_evenly_and_belong_to_the_clip(bank):
     torch.testing.assert_close(clips(bank, some)[COUNT // 2 :], shifted[: COUNT // 2])
 
 
+def test_a_share_of_the_clips_is_the_noise_alone(bank):
+    both = [NoisyMicrophone(snr=(10, 10), noise_rms=0.0, silent=share) for share in (0.0, 0.25)]
+    whole, some = (torch.cat([clips(bank, own, COUNT * k) for k in range(8)]) for own in both)
+    same = (whole == some).all(-1).all(-1)
+    assert abs(float((~same).float().mean()) - 0.25) < 4 * (0.25 * 0.75 / len(whole)) ** 0.5
+    ratio = decibels(some[~same].square().mean((1, 2)) / whole[~same].square().mean((1, 2)))
+    assert abs(float(ratio.mean()) + 10 * np.log10(11)) < 0.5, "noise, without ten times its power"
+
+
 def test_the_noise_of_a_clip_has_no_seam(bank):
     low = NoisyMicrophone(snr=(0, 0), noises=["appliance_furnace"], noise_rms=0.0)
     noise = clips(bank, low) - clips(bank, Microphone(noise_rms=0.0))
@@ -76,6 +85,7 @@ def test_the_noise_of_a_clip_has_no_seam(bank):
         ({"noises": ()}, "microphone.noises"),
         ({"noises": ("hum.wav",)}, "hum.wav"),
         ({"noise_rms": -1}, "microphone.noise_rms"),
+        ({"silent": 1.5}, "microphone.silent"),
     ],
 )
 def test_what_cannot_work_is_named(given, named):

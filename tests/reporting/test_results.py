@@ -208,3 +208,17 @@ def test_write_csv_leaves_nothing_half_written(
         write_csv(pd.DataFrame({"a": [2]}), path)
     assert path.read_text(encoding="utf-8") == "a\n1\n"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_metrics_of_what_changes_in_an_episode_stand_behind_the_others() -> None:
+    frame = episodes()
+    plain = summarise(frame)
+    frame["success_when_silent"] = frame["success"] * (frame["start_cell"] % 2)
+    found = summarise(frame)
+    assert tuple(found.columns) == (*RESULT_COLUMNS, "sws", "sws_low", "sws_high")
+    pd.testing.assert_frame_equal(found[list(RESULT_COLUMNS)], plain)
+    room = only(found, sound="ring", scene="room_1")
+    own = frame[(frame["sound"] == "ring") & (frame["scene"] == "room_1")]
+    assert room["sws"] == pytest.approx(own["success_when_silent"].mean())
+    across = across_runs(frame)
+    assert {"sws", "sws_std", "sws_network_std"} <= set(across)

@@ -196,7 +196,7 @@ class ClipRenderer:
         """
         rate, samples = self.sounds.rate, brirs.shape[-1]
         before = -(-samples // rate) * rate  # samples before the clip that are still heard
-        times = torch.arange(-before, rate, device=brirs.device) / rate
+        times = torch.arange(-before, rate, dtype=torch.float64, device=brirs.device) / rate
         emitted = (times >= begin[:, None]) & (times < end[:, None])
         dry = self._dry(clip).repeat(1, before // rate + 1) * emitted
         # the size of the transform keeps the end of the convolution off the clip

@@ -48,6 +48,9 @@ class BeliefAgent(PlannerAgent):
         Information of a direction of arrival, in nats, below which nothing counts as heard: the
         difference of its entropy from that of a uniform distribution; 0 or more. Where it has heard
         nothing yet, the agent turns.
+    silent_after : int
+        Actions in a row without hearing anything after which the sound counts as ended, 1 or more:
+        the agent then stops at the likeliest square, for protocols with Stop.
     stop_half_life : float or None
         Actions after which `stop_above` has halved, more than 0; None for never.
     **planner
@@ -63,6 +66,7 @@ class BeliefAgent(PlannerAgent):
         stop_at: float = 0.5,
         confirm: bool = True,
         least_information: float = 0.0,
+        silent_after: int = 8,
         stop_half_life: float | None = None,
         **planner: Any,
     ) -> None:
@@ -72,6 +76,9 @@ class BeliefAgent(PlannerAgent):
         if not 0 < stop_above <= 1:
             raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and up to 1")
         self.model, self.stop_by, self.stop_above = model or ArrivalModel(), stop_by, stop_above
+        if silent_after < 1:
+            raise UserError(f"planner.silent_after: {silent_after}; give actions, 1 or more")
+        self.silent_after = silent_after
         if stop_half_life is not None and not stop_half_life > 0:
             raise UserError(
                 f"planner.stop_half_life: {stop_half_life}; give actions, more than 0, or null"
@@ -91,14 +98,15 @@ class BeliefAgent(PlannerAgent):
         """Return the settings of the source filter, and those of Stop that do not count."""
         classified = protocol.requires_stop and self.stop_by == "classifier"
         stop = () if protocol.requires_stop else ("stop_by", "confirm")
-        above = ("stop_above", "stop_half_life") if classified or not protocol.requires_stop else ()
-        return ("source_filter", "error", *stop, *above)
+        posterior = ("stop_above", "stop_half_life", "silent_after")
+        unread = posterior if classified or not protocol.requires_stop else ()
+        return ("source_filter", "error", *stop, *unread)
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
         """Begin N new episodes. See `Agent.reset`."""
         super().reset(n, generator, protocol)
         self._belief: ArrivalBelief | None = None
-        self._actions = 0
+        self._actions, self._silent = 0, np.zeros(n, dtype=np.int64)
         self._goal = goal_offsets(protocol)
 
     def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
@@ -110,6 +118,7 @@ class BeliefAgent(PlannerAgent):
         squares = heard.distance - torch.tensor([math.log(CELL), 0.0])
         self._actions += 1
         audible = (information(heard) >= self.least_information).numpy()
+        self._silent = np.where(audible, 0, self._silent + 1)
         belief.hear(pose, heard.bearing.numpy(), squares.numpy(), active, audible)
         if not (self.protocol.requires_stop and self.stop_by == "belief"):
             belief.rule_out(pose[:, :2], self._near, active)
@@ -142,7 +151,11 @@ class BeliefAgent(PlannerAgent):
         enough = self.stop_above
         if self.stop_half_life is not None:
             enough *= 0.5 ** (self._actions / self.stop_half_life)
-        return torch.from_numpy(self._belief.near(position, self._goal) >= enough)
+        stops = self._belief.near(position, self._goal) >= enough
+        # nothing more will be learnt: the likeliest square is the best guess
+        ended = (self._silent >= self.silent_after) & self._belief.informed()
+        at_target = (self._targets(self._active & ended) == position).all(1)
+        return torch.from_numpy(stops | (ended & at_target))
 
 
 def information(heard: Arrivals) -> Tensor:
