@@ -191,6 +191,9 @@ LACKING = {
     "algorithm": ("build_loss",),
     "protocol": ("goal_cells", "judge"),
     "microphone": ("record",),
+    "schedule": ("draw",),
+    "distractor": ("draw",),
+    "odometry": ("failures",),
     "renderer": ("prepare", "views"),
     "backbone": ("pooled",),
 }

@@ -10,6 +10,7 @@ from avn.config.folder import conf_folder
 from avn.config.python import compose_command
 from avn.core.classes import build_object
 from avn.core.settings import plain
+from avn.pipeline.dynamics import GROUPS, build_dynamics
 
 FILES = sorted((conf_folder() / "condition").glob("*.yaml"))
 NAMES = [path.stem for path in FILES]
@@ -29,8 +30,9 @@ def test_it_composes_with_a_row_and_leaves_training_alone(condition, row):
     assert plain(cfg, "agent") == plain(usual, "agent")
     changed = {key for key in usual if plain(cfg, str(key)) != plain(usual, str(key))}
     assert bool(changed) == (condition != "none")
-    assert changed <= {"sound", "episodes", "microphone", "acoustics"}
+    assert changed <= {"sound", "episodes", "microphone", "acoustics", *GROUPS}
     build_object("microphone", cfg.microphone)
+    build_dynamics(cfg)
 
 
 @pytest.mark.parametrize("condition", [name for name in NAMES if name != "heard"])

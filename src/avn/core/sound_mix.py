@@ -1,4 +1,4 @@
-"""What a second of sound is made of besides the steady sound of one source."""
+"""Mix of a second of sound: when its source sounds, and a second source."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from torch import Tensor
 
 
 class SoundMix(NamedTuple):
-    """When the source of N agents sounds within a second, and what else sounds.
+    """Part of a second in which the source of N agents sounds, and a second source.
 
     Attributes
     ----------

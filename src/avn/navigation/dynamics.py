@@ -17,7 +17,7 @@ from avn.navigation.schedule import Schedule
 
 @dataclass(frozen=True)
 class Dynamics:
-    """What changes in the course of an episode; by default nothing does.
+    """Parts of the world that change in the course of an episode; none by default.
 
     Attributes
     ----------

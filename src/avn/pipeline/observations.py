@@ -219,7 +219,7 @@ class Observed:
 
     @property
     def mixed(self) -> bool:
-        """Whether sounds begin or end in an episode, or are heard with another one."""
+        """True if sounds begin or end in an episode, or are heard with another one."""
         return bool({"schedule", "distractor"} & {*changing(self.cfg)})
 
     def is_true(self, name: str) -> bool:

@@ -223,7 +223,17 @@ class RenderedClips:
 
 
 def batches(clip: ClipId, mix: SoundMix | None, size: int) -> list[tuple[ClipId, SoundMix | None]]:
-    """Split clips into batches."""
+    """Split clips into batches.
+
+    Parameters
+    ----------
+    clip : ClipId
+        Clips of N agents.
+    mix : SoundMix or None
+        Mix of each clip.
+    size : int
+        Clips in a batch.
+    """
     clips = [ClipId(*parts) for parts in zip(*(p.split(size) for p in clip), strict=True)]
     if mix is None:
         return [(own, None) for own in clips]
