@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from tensordict import TensorDict
 
 STOPS = ("belief", "classifier")
+TARGETS = ("goal", "square")
 
 
 class BeliefAgent(PlannerAgent):
@@ -48,6 +49,9 @@ class BeliefAgent(PlannerAgent):
         Information of a direction of arrival, in nats, below which nothing counts as heard: the
         difference of its entropy from that of a uniform distribution; 0 or more. Where it has heard
         nothing yet, the agent turns.
+    target : {"goal", "square"}
+        Where it walks to: the square from which success is likeliest, or the likeliest square of
+        the source.
     silent_after : int
         Actions in a row without hearing anything after which the sound counts as ended, 1 or more:
         the agent then stops at the likeliest square, for protocols with Stop.
@@ -66,6 +70,7 @@ class BeliefAgent(PlannerAgent):
         stop_at: float = 0.5,
         confirm: bool = True,
         least_information: float = 0.0,
+        target: str = "goal",
         silent_after: int = 8,
         stop_half_life: float | None = None,
         **planner: Any,
@@ -76,6 +81,9 @@ class BeliefAgent(PlannerAgent):
         if not 0 < stop_above <= 1:
             raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and up to 1")
         self.model, self.stop_by, self.stop_above = model or ArrivalModel(), stop_by, stop_above
+        if target not in TARGETS:
+            raise UserError(f"planner.target: '{target}' is none of {', '.join(TARGETS)}")
+        self.target = target
         if silent_after < 1:
             raise UserError(f"planner.silent_after: {silent_after}; give actions, 1 or more")
         self.silent_after = silent_after
@@ -126,7 +134,8 @@ class BeliefAgent(PlannerAgent):
 
     def _targets(self, active: np.ndarray) -> np.ndarray:
         assert self._belief is not None
-        return self._belief.targets(self.mapper.graph.cost, active)
+        around = self._goal if self.target == "goal" else None
+        return self._belief.targets(self.mapper.graph.cost, active, around)
 
     def _planned(self, active: np.ndarray) -> Tensor:
         """Return the first action of the shortest path; a turn for those who heard nothing."""

@@ -188,18 +188,40 @@ class ArrivalBelief(Searched):
         weight = model.distance_weight * self._weight[row, slot]
         return (mean * precision).sum(1) / total, weight * once
 
-    def targets(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Return the column and row of each agent's likeliest square, (N, 2) int64.
+    def targets(
+        self,
+        cost: NDArray[np.float32],
+        active: NDArray[np.bool_],
+        offsets: NDArray[np.int64] | None = None,
+    ) -> NDArray[np.int64]:
+        """Return the column and row of the square that each agent walks to, (N, 2) int64.
 
         If all squares were searched, the search begins again.
+
+        Parameters
+        ----------
+        cost : (N, M, M) float32
+            See `PartialGraph`.
+        active : (N,) bool
+            Agents to answer for.
+        offsets : (k, 2) int64, optional
+            Offsets in columns and rows from a square to where the source may be for an agent to
+            succeed there: the square with the greatest probability of success is returned. By
+            default the likeliest square of the source.
         """
         flat = self.log_belief.reshape(len(cost), -1)
-        best = flat.argmax(1)
-        none = active & ~np.isfinite(flat[np.arange(len(flat)), best])
+        none = active & ~np.isfinite(flat.max(1))
         if none.any():
             self.searched[none] = False
             self.score(cost, none)
-            best[none] = flat[none].argmax(1)
+        best = flat.argmax(1)
+        if offsets is not None:
+            rows = np.flatnonzero(active)
+            best[rows] = (
+                _most_around(self.log_belief[rows], offsets)
+                .reshape(len(rows), flat.shape[1])
+                .argmax(1)
+            )
         return np.stack((best % cost.shape[1], best // cost.shape[1]), 1)
 
     def heard_around(self) -> NDArray[np.bool_]:
@@ -228,6 +250,22 @@ class ArrivalBelief(Searched):
         own = np.take_along_axis(belief, squares[..., 1] * size + squares[..., 0], 1)
         found: NDArray[np.float64] = own.sum(1) / np.maximum(belief.sum(1), 1e-30)
         return found
+
+
+def _most_around(
+    log_belief: NDArray[np.float32], offsets: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Return the probability around each square, up to a factor; 0 where the source cannot be."""
+    top = log_belief.max((1, 2), keepdims=True)
+    belief = np.exp(log_belief - np.where(np.isfinite(top), top, 0))
+    most = int(np.abs(offsets).max(initial=0))
+    wide = np.pad(belief, ((0, 0), (most, most), (most, most)))
+    size = log_belief.shape[1]
+    total = np.zeros_like(belief)
+    for column, row in offsets:
+        rows, columns = (slice(most + off, most + off + size) for off in (row, column))
+        total += wide[:, rows, columns]
+    return np.where(belief > 0, total, np.float32(0))
 
 
 @numba.njit(cache=True, parallel=True)
