@@ -14,6 +14,7 @@ WORLD = (
     "stop_model.epochs=1",
     "realisations=1",
     "sound=alarm",
+    "protocol.max_actions=80",  # agents that have learnt nothing use them up
 )
 
 

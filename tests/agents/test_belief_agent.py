@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
 import torch
@@ -14,6 +15,7 @@ from avn.core.errors import UserError
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.navigation_scene import draw
 from avn.navigation.protocols import Protocol
+from avn.planning.arrival_belief import ArrivalBelief
 from avn.planning.settings import ArrivalModel
 
 
@@ -35,9 +37,9 @@ def test_an_agent_that_hears_nothing_arrives_less_often():
     scene = draw("flat", FLAT)
     nothing = torch.zeros_like(heard(scene))
     nothing[..., :BINS] = -math.log(BINS)
-    nothing[..., BINS + 1] = 10.0
+    nothing[..., BINS], nothing[..., BINS + 1] = math.log(4.0), 1000.0
     frame = run(BeliefAgent(OccupancyMapper(SIZE), obstacle_threshold=0.01), VAR, nothing)
-    assert frame["success"].mean() < 0.7
+    assert frame["success"].mean() < 0.5
 
 
 def test_the_classifier_can_decide_to_stop():
@@ -82,6 +84,23 @@ def test_settings_without_effect_are_named():
         BeliefAgent(OccupancyMapper(SIZE), stop_by="luck")
     with pytest.raises(UserError, match=r"planner\.stop_above: 0"):
         BeliefAgent(OccupancyMapper(SIZE), stop_above=0)
+    with pytest.raises(UserError, match=r"planner\.target: 'door'"):
+        BeliefAgent(OccupancyMapper(SIZE), target="door")
+
+
+def test_the_target_is_the_square_from_which_success_is_likeliest():
+    # one likely square far off, and a cluster of less likely ones
+    belief = ArrivalBelief(1, 9, 8, ArrivalModel())
+    belief.log_belief[:] = -math.inf
+    belief.log_belief[0, 1, 1] = math.log(0.3)
+    for x, y in ((6, 6), (5, 6), (7, 6), (6, 5), (6, 7)):
+        belief.log_belief[0, y, x] = math.log(0.14)
+    cost, active = np.ones((1, 9, 9), np.float32), np.array([True])
+    assert belief.targets(cost, active).tolist() == [[1, 1]]
+    assert belief.targets(cost, active, goal_offsets(STOP)).tolist() == [[6, 6]]
+    belief.log_belief[0, 6, 6] = -math.inf  # where the source cannot be, it does not walk
+    (found,) = belief.targets(cost, active, goal_offsets(STOP)).tolist()
+    assert found != [6, 6]
 
 
 def test_the_goal_is_that_of_the_protocol():

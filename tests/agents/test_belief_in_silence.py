@@ -7,7 +7,7 @@ import torch
 from heard_places import BINS, SIZE, arrival, heard, observation
 from small_places import FLAT, STOP, VAR
 
-from avn.agents.belief_agent import BeliefAgent, information
+from avn.agents.belief_agent import BeliefAgent
 from avn.agents.rollout import Labels, rollout_scene
 from avn.apartments.local_patch import window_cells
 from avn.core.actions import ROTATE_RIGHT
@@ -45,6 +45,7 @@ class Ears:
 
 
 def walked(protocol, schedule, **settings):
+    """Records of an agent in a drawn flat."""
     scene = draw("flat", FLAT)
     agent = BeliefAgent(OccupancyMapper(SIZE), obstacle_threshold=0.01, **settings)
     seen = {"local_patch": torch.from_numpy(window_cells(scene.grid) >= 0).float()}
@@ -59,14 +60,14 @@ def test_the_information_of_a_direction_is_in_nats():
     values = nothing(2)
     values[1] = arrival([30])[0]
     values[1, :BINS] = values[1, :BINS].log_softmax(0)
-    found = information(Arrivals(values))
+    found = Arrivals(values).information
     assert float(found[0]) == pytest.approx(0, abs=1e-5)
     assert math.log(BINS) - 0.3 < float(found[1]) < math.log(BINS)
     half = nothing(1)
     half[0, :BINS] = -math.inf
     half[0, : BINS // 2] = -math.log(BINS // 2)
     half[0, BINS // 2 : BINS] = -1e9
-    assert float(information(Arrivals(half))) == pytest.approx(math.log(2), abs=1e-4)
+    assert float(Arrivals(half).information) == pytest.approx(math.log(2), abs=1e-4)
 
 
 def test_it_turns_until_it_hears_something():
@@ -79,11 +80,11 @@ def test_it_turns_until_it_hears_something():
 def test_it_arrives_after_the_sound_has_ended():
     brief = Schedule((0, 0), 3, 0)
     patient = walked(STOP, brief, least_information=0.5)
-    assert patient["success"].mean() > 0.85
+    assert patient["success"].mean() > 0.8
     assert patient["success_when_silent"].mean() > 0.6
     # one that takes silence for a sound forgets what it heard
     forgetful = walked(STOP, brief)
-    assert forgetful["success"].mean() < patient["success"].mean() - 0.1
+    assert forgetful["success"].mean() < patient["success"].mean() - 0.2
 
 
 def test_a_late_sound_costs_time_and_no_success():

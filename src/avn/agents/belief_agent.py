@@ -125,7 +125,7 @@ class BeliefAgent(PlannerAgent):
         belief = self._belief
         squares = heard.distance - torch.tensor([math.log(CELL), 0.0])
         self._actions += 1
-        audible = (information(heard) >= self.least_information).numpy()
+        audible = (heard.information >= self.least_information).numpy()
         self._silent = np.where(audible, 0, self._silent + 1)
         belief.hear(pose, heard.bearing.numpy(), squares.numpy(), active, audible)
         if not (self.protocol.requires_stop and self.stop_by == "belief"):
@@ -165,12 +165,6 @@ class BeliefAgent(PlannerAgent):
         ended = (self._silent >= self.silent_after) & self._belief.informed()
         at_target = (self._targets(self._active & ended) == position).all(1)
         return torch.from_numpy(stops | (ended & at_target))
-
-
-def information(heard: Arrivals) -> Tensor:
-    """Return the information of directions of arrival in nats, (N,), 0 for a uniform one."""
-    entropy = -(heard.bearing.exp() * heard.bearing).sum(-1)
-    return (math.log(heard.bins) - entropy).clamp_min(0)
 
 
 def goal_offsets(protocol: Protocol) -> NDArray[np.int64]:

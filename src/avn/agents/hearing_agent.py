@@ -39,6 +39,9 @@ class HearingAgent(PlannerAgent):
     stop_above : float
         Probability of such a length, by the heard distribution, from which it stops; more than 0
         and below 1.
+    least_information : float
+        Information of a direction of arrival, in nats, below which nothing counts as heard, 0 or
+        more; the agent then keeps what it heard before.
     **planner
         Other parameters of `PlannerAgent`, without those of its source filter.
 
@@ -49,7 +52,12 @@ class HearingAgent(PlannerAgent):
     """
 
     def __init__(
-        self, mapper: Mapper, stop_within: float = 0.9, stop_above: float = 0.5, **planner: Any
+        self,
+        mapper: Mapper,
+        stop_within: float = 0.9,
+        stop_above: float = 0.5,
+        least_information: float = 0.0,
+        **planner: Any,
     ) -> None:
         super().__init__(mapper, **planner)
         if not 0 < stop_within <= 100:
@@ -58,7 +66,10 @@ class HearingAgent(PlannerAgent):
             )
         if not 0 < stop_above < 1:
             raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and less than 1")
+        if not least_information >= 0:
+            raise UserError(f"planner.least_information: {least_information}; give nats, 0 or more")
         self.stop_within, self.stop_above = stop_within, stop_above
+        self.least_information = least_information
         self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
 
     def wants(self, protocol: Protocol) -> tuple[str, ...]:
@@ -75,6 +86,7 @@ class HearingAgent(PlannerAgent):
         super().reset(n, generator, protocol)
         # direction on the map, turns clockwise from its front
         self._heard = np.zeros(n)
+        self._informed = np.zeros(n, dtype=np.bool_)
 
     def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
         heard = Arrivals(observation["arrival"].float())
@@ -84,6 +96,10 @@ class HearingAgent(PlannerAgent):
             self._source_belief = SourceBelief(self.n, size, "latest", SourceErrorModel())
         # Directions heard with different headings at one place may contradict each other.
         updated = active & (self._turns < self.max_rotations).numpy()
+        audible = (heard.information >= self.least_information).numpy()
+        # before anything was heard, any direction will do
+        updated &= audible | ~self._informed
+        self._informed |= audible
         turns = heard.bearing.argmax(-1).numpy() / heard.bins + pose[:, 2].numpy() / HEADINGS
         self._heard = np.where(updated, turns % 1.0, self._heard)
         aim = self._aim(heard, pose[:, 2])
@@ -95,9 +111,10 @@ class HearingAgent(PlannerAgent):
         """Return the column and row of the place that the agents walk to, (N, 2) float64."""
 
     def _stops(self, observation: TensorDict) -> Tensor:
-        mean, sigma = Arrivals(observation["arrival"].float()).distance.unbind(-1)
+        heard = Arrivals(observation["arrival"].float())
+        mean, sigma = heard.distance.unbind(-1)
         within = torch.special.ndtr((math.log(self.stop_within) - mean) / sigma)
-        return within >= self.stop_above
+        return (within >= self.stop_above) & (heard.information >= self.least_information)
 
     def _on_map(self, metres: Tensor, heading: Tensor) -> NDArray[np.float64]:
         """Return the column and row of places (N, 2) in metres to the agents' right and front."""

@@ -68,6 +68,12 @@ class Arrivals:
         return self.values[..., : self.bins]
 
     @property
+    def information(self) -> Tensor:
+        """Information of the direction of arrival in nats, (...): 0 if all are as likely."""
+        entropy = -(self.bearing.exp() * self.bearing).sum(-1)
+        return (math.log(self.bins) - entropy).clamp_min(0)
+
+    @property
     def distance(self) -> Tensor:
         """Mean and standard deviation of the logarithm of the path's length, (..., 2)."""
         return self.values[..., self.bins : self.bins + 2]
