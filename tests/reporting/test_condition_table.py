@@ -43,3 +43,20 @@ def test_the_text_keeps_the_order_and_leaves_missing_cells_empty(episodes):
     assert text[0] == "| condition | `greedy` | `belief` |"
     assert [line.split("|")[1].strip() for line in text[2:]] == ["`unheard`", "`heard`"]
     assert all(line.split("|")[2].strip() == "" for line in text[2:])
+
+
+def test_a_condition_in_which_something_changes_has_further_lines(episodes):
+    silent = episodes["condition"] == "unheard"
+    first = episodes["start_cell"] % 2 == 0
+    episodes["success_when_silent"] = (episodes["success"] * first).where(silent)
+    cells = condition_cells(episodes)
+    plain = condition_cells(episodes.drop(columns="success_when_silent"))
+    pd.testing.assert_frame_equal(cells[plain.columns], plain)
+    row = cells.set_index(["agent", "condition"])["sws"]
+    own = episodes[silent & (episodes["agent"] == "belief")]
+    by_hand = 100 * own.groupby("scene")["success_when_silent"].mean().mean()
+    assert row["belief", "unheard"] == pytest.approx(by_hand)
+    assert np.isnan(row["belief", "heard"])
+    lines = markdown(cells, ["heard", "unheard"], ["belief"]).splitlines()[2:]
+    assert "SWS" not in lines[0]
+    assert f"SWS, %: {by_hand:.1f}" in lines[1]

@@ -8,12 +8,14 @@ import pandas as pd
 from rich.table import Table
 from rich.text import Text
 
-from avn.reporting.results import ALL_SOUNDS, AVERAGE, across_runs
+from avn.reporting.results import ALL_SOUNDS, AVERAGE, DYNAMIC_METRICS, across_runs, metrics_of
 
 CONDITION = "condition"
-_PERCENT = tuple(
-    f"{metric}{end}" for metric in ("sr", "spl") for end in ("", "_low", "_high", "_network_std")
-)
+_ENDS = ("", "_low", "_high", "_network_std")
+_PERCENT = tuple(f"{metric}{end}" for metric in ("sr", "spl") for end in _ENDS)
+# Factors of the metrics of conditions in which something changes in an episode.
+_FACTORS = {"sws": 100.0, "dsr": 100.0, "drift": 1.0}
+_UNITS = {"sws": "SWS, %", "dsr": "DSR, %", "drift": "drift, m"}
 
 
 def condition_cells(episodes: pd.DataFrame) -> pd.DataFrame:
@@ -29,19 +31,26 @@ def condition_cells(episodes: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         `agent`, `condition`, `protocol`, `acoustics`, `look`, `networks`, `episodes` of each
         network, and in %: `sr`, `spl`, their 95 % intervals over networks, apartments, sources and
-        episodes, and their standard deviations over networks.
+        episodes, and their standard deviations over networks. The same of `sws`, `dsr` (%) and
+        `drift` (metres) where a condition has them; see `avn.reporting.results.DYNAMIC_METRICS`.
     """
     rows = []
     for condition, own in episodes.groupby(CONDITION, sort=False):
-        # the sounds are pooled: an episode has one of many
-        found = across_runs(own.drop(columns=CONDITION).assign(sound=ALL_SOUNDS))
+        # columns of other conditions are empty; the sounds are pooled: an episode has one of many
+        own = own.drop(columns=CONDITION).dropna(axis="columns", how="all")
+        found = across_runs(own.assign(sound=ALL_SOUNDS))
         average = found[found["scene"] == AVERAGE]
         rows.append(average.assign(**{CONDITION: condition}))
     cells = pd.concat(rows, ignore_index=True)
     cells["episodes"] //= cells["networks"]
     cells[list(_PERCENT)] *= 100.0
+    dynamic = [
+        f"{metric}{end}" for metric in metrics_of(episodes) if metric in _FACTORS for end in _ENDS
+    ]
+    for column in dynamic:
+        cells[column] *= _FACTORS[column.split("_")[0]]
     labels = ["agent", CONDITION, "protocol", "acoustics", "look", "networks", "episodes"]
-    return cells[[*labels, *_PERCENT]]
+    return cells[[*labels, *_PERCENT, *dynamic]]
 
 
 def terminal(cells: pd.DataFrame, conditions: Sequence[str], agents: Sequence[str]) -> Table:
@@ -63,6 +72,8 @@ def terminal(cells: pd.DataFrame, conditions: Sequence[str], agents: Sequence[st
         table.add_row(Text(condition, style="bold"), *(main for main, _ in texts))
         if any(interval for _, interval in texts):
             table.add_row("  95 %", *(interval for _, interval in texts), style="dim")
+        for unit, values in _others(cells, agents, condition):
+            table.add_row(f"  {unit}", *values, style="dim")
     return table
 
 
@@ -73,8 +84,27 @@ def markdown(cells: pd.DataFrame, conditions: Sequence[str], agents: Sequence[st
     for condition in conditions:
         texts = [_text(cells, agent, condition) for agent in agents]
         found = [f"{main}<br>{interval}" if interval else main for main, interval in texts]
+        for unit, values in _others(cells, agents, condition):
+            found = [
+                f"{text}<br>{unit}: {value}" if value else text
+                for text, value in zip(found, values, strict=True)
+            ]
         lines.append(f"| `{condition}` | {' | '.join(found)} |")
     return "\n".join([*lines, ""])
+
+
+def _others(
+    cells: pd.DataFrame, agents: Sequence[str], condition: str
+) -> list[tuple[str, list[str]]]:
+    """Return the further metrics of a condition: name with unit, and the text of each agent."""
+    own = cells[cells[CONDITION] == condition].set_index("agent")
+    found = []
+    for metric in DYNAMIC_METRICS:
+        if metric in own and own[metric].notna().any():
+            values = own[metric].reindex(list(agents))
+            texts = ["" if pd.isna(value) else f"{value:.1f}" for value in values]
+            found.append((_UNITS[metric], texts))
+    return found
 
 
 def _text(cells: pd.DataFrame, agent: str, condition: str) -> tuple[str, str]:
