@@ -192,7 +192,7 @@ LACKING = {
     "protocol": ("goal_cells", "judge"),
     "microphone": ("record",),
     "schedule": ("draw",),
-    "distractor": ("draw",),
+    "distractor": ("check", "draw"),
     "odometry": ("failures",),
     "renderer": ("prepare", "views"),
     "backbone": ("pooled",),

@@ -115,6 +115,16 @@ def test_the_world_is_named_with_what_was_changed(tmp_path):
         "acoustics resonance with head=kemar (networks trained in resonance with head=ku100); "
     )
     assert "training" not in world("agent=random_walk")  # it has no network
+    changing = world("agent=random_walk", "schedule=intermittent", "schedule.mean=30")
+    assert "; schedule intermittent with mean=30.0; test apartments" in changing
+
+
+@pytest.mark.parametrize(
+    "option", ["schedule=intermittent", "distractor=other_category", "odometry=noisy"]
+)
+def test_the_papers_results_do_not_stand_beside_a_world_that_changes(option):
+    cfg = composed("agent=random_walk", option)
+    assert not paper_sounds(cfg, default_config(cfg))
 
 
 def test_sounds_not_heard_in_training_are_named(tmp_path):

@@ -50,6 +50,22 @@ def test_an_option_stands_for_its_settings_and_a_change_for_itself():
     ]
 
 
+def test_what_changes_in_an_episode_is_named():
+    assert names(
+        "agent=greedy schedule=intermittent",
+        "agent=greedy schedule=intermittent odometry=noisy",
+        "agent=greedy",
+    ) == [
+        "greedy, schedule=intermittent",
+        "greedy, schedule=intermittent, odometry=noisy",
+        "greedy",
+    ]
+    assert names("agent=greedy odometry=noisy", "agent=greedy odometry=noisy odometry.slip=0") == [
+        "greedy",
+        "greedy, odometry.slip=0.0",
+    ]
+
+
 def test_seeds_and_sounds_are_named_where_they_differ():
     assert names("agent=greedy seed=0", "agent=greedy seed=1") == [
         "greedy, seed=0",

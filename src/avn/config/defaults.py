@@ -12,12 +12,13 @@ from avn.config.folder import conf_folder
 from avn.config.python import composing
 
 # Groups whose options a run names besides its row.
-_GROUPS = ("split", "acoustics", "protocol")
+_GROUPS = ("split", "acoustics", "protocol", "schedule", "distractor", "odometry")
 
 
 def default_config(cfg: DictConfig) -> DictConfig:
-    """Return the config of a run's row under its split, acoustics and protocol, all unchanged.
+    """Return the config of a run's row in its world, as the package defines the two.
 
+    The world is the options of split, acoustics and protocol, and of what changes in an episode.
     Options are those of the package: a name that the package does not have is left at its default,
     so that a row or an option of the user differs from what is returned.
 

@@ -163,9 +163,9 @@ class CoreConfig:
     split: SplitConfig = MISSING
     acoustics: AcousticsConfig = MISSING
     microphone: Option = MISSING
-    schedule: Option = MISSING
-    distractor: Option = MISSING
-    odometry: Option = MISSING
+    schedule: NamedOption = MISSING
+    distractor: NamedOption = MISSING
+    odometry: NamedOption = MISSING
     sound: dict[str, str] = MISSING
     training: TrainingConfig = field(default_factory=TrainingConfig)
     sound_model: NamedOption = MISSING
@@ -251,9 +251,9 @@ BASES: dict[str, type] = {
     "protocol": NamedOption,
     "algorithm": AlgorithmOption,
     "microphone": Option,
-    "schedule": Option,
-    "distractor": Option,
-    "odometry": Option,
+    "schedule": NamedOption,
+    "distractor": NamedOption,
+    "odometry": NamedOption,
     "renderer": RendererConfig,
     "backbone": BackboneConfig,
 }

@@ -86,7 +86,7 @@ def _reason(command: str, key: str, cfg: DictConfig) -> str:
         return f"which trains in the training world; give {own}{key[len(group) :]}"
     node = cfg.get(group)
     if isinstance(node, DictConfig) and "_target_" in node and node["_target_"] is None:
-        return f"which has no {group} ({group}=none)"
+        return f"which has no {group} ({group}={node.get('name', 'none')})"
     return "which does not use it with its other settings"
 
 

@@ -28,6 +28,29 @@ class Distractor:
     def __init__(self, categories: Mapping[str, str]) -> None:
         self.categories = dict(categories)
 
+    def check(self, sources: int, sounds: Sequence[str]) -> None:
+        """Refuse an apartment without a place for a distractor, and sounds without another.
+
+        Parameters
+        ----------
+        sources : int
+            Number of sources of the apartment.
+        sounds : sequence of str
+            Names of the sounds.
+
+        Raises
+        ------
+        UserError
+            If the apartment has one source, or all sounds have one category.
+        """
+        if sources < 2:
+            raise UserError("distractor: an apartment has one source and no place for a second")
+        if len({self.categories[name] for name in sounds}) < 2:
+            raise UserError(
+                "distractor: all sounds are of one category; give sounds of several, such as "
+                "sound=unheard"
+            )
+
     def draw(
         self,
         keys: NDArray[np.uint64],
@@ -52,17 +75,11 @@ class Distractor:
         Raises
         ------
         UserError
-            If the apartment has one source, or all sounds have one category.
+            See `check`.
         """
-        if sources < 2:
-            raise UserError("distractor: an apartment has one source and no place for a second")
+        self.check(sources, sounds)
         categories = np.array([self.categories[name] for name in sounds])
         other_category = categories[:, None] != categories[None, :]
-        if not other_category.any(1).all():
-            raise UserError(
-                "distractor: all sounds are of one category; give sounds of several, such as "
-                "sound=unheard"
-            )
         step = 1 + (scramble(keys, 0) % np.uint64(sources - 1)).astype(np.int64)
         # the n-th of the sounds of another category
         count = other_category.sum(1)[sound].astype(np.uint64)

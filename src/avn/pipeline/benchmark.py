@@ -11,6 +11,7 @@ from avn.acoustics.sound_names import joined_names
 from avn.core.settings import plain
 from avn.modules.settings import SAME_WEIGHTS
 from avn.pipeline.apartments import TEST, TRAINING
+from avn.pipeline.dynamics import STEADY, changing
 from avn.pipeline.published_networks import PUBLISHED
 from avn.pipeline.run import Evaluation, agent_label
 from avn.pipeline.sounds import sound_files
@@ -21,7 +22,7 @@ from avn.reporting.results import ALL_SOUNDS
 from avn.reporting.world import sounds_text, trial_note
 
 # World of the paper: the direct sound passes through walls, as in its sound engine.
-PAPER_WORLD = {"split": "var", "protocol": "var", "acoustics": "resonance"}
+PAPER_WORLD = {"split": "var", "protocol": "var", "acoustics": "resonance", **STEADY}
 # Settings in which repetitions of a run differ, and those that change no record.
 NOT_COMPARED = (
     *("seed", "train_seed", "film", "film_show", "film_speed", *MACHINE),
@@ -125,6 +126,7 @@ def describe_world(cfg: DictConfig, default: DictConfig) -> str:
         head = f" with head={training.head}" if training.head != cfg.acoustics.head else ""
         acoustics += f" (networks trained in {training.name}{head})"
     parts = [acoustics, _named(cfg, "protocol", changed), sounds_text(*_sounds(cfg))]
+    parts += [_named(cfg, group, changed) for group in changing(cfg)]
     if microphone := _changes("microphone", changed):
         parts.append(f"microphone with {microphone}")
     split = _named(cfg, "split", changed)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from omegaconf import DictConfig
 
 from avn.acoustics.sound_table import packaged_sounds
+from avn.apartments.floor_plan import FloorPlan
 from avn.core.classes import build_object
 from avn.navigation.dynamics import Dynamics
 from avn.pipeline.sounds import sound_files
 
-# Groups of the config, as the attributes of `Dynamics`.
-GROUPS = ("schedule", "distractor", "odometry")
+# Groups of the config, as the attributes of `Dynamics`, and the options by which nothing changes.
+STEADY = {"schedule": "continuous", "distractor": "none", "odometry": "exact"}
+GROUPS = tuple(STEADY)
 
 
 def changing(cfg: DictConfig) -> tuple[str, ...]:
@@ -29,6 +32,13 @@ def build_dynamics(cfg: DictConfig) -> Dynamics:
             for group in changing(cfg)
         }
     )
+
+
+def check_dynamics(cfg: DictConfig, plans: Sequence[FloorPlan]) -> None:
+    """Refuse settings with which an episode in one of the apartments could not be drawn."""
+    if distractor := build_dynamics(cfg).distractor:
+        for plan in plans:
+            distractor.check(len(plan.sources), list(sound_files(cfg)))
 
 
 def _categories(cfg: DictConfig) -> dict[str, str]:

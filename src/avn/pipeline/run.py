@@ -39,7 +39,7 @@ from avn.pipeline.agent import (
     check_agent,
 )
 from avn.pipeline.apartments import Apartments
-from avn.pipeline.dynamics import build_dynamics, changing
+from avn.pipeline.dynamics import build_dynamics, changing, check_dynamics
 from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import learns
@@ -177,7 +177,7 @@ class Evaluation(Stage):
                 "no exploration walk; take episodes=frozen and protocol.exploration_steps=400"
             )
         check_agent(cfg, agent)
-        build_dynamics(cfg)
+        check_dynamics(cfg, self.apartments.plans)
         dry_sounds(cfg)  # a bad file is refused before anything is made
 
     def done(self) -> bool:

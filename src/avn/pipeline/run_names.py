@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from avn.acoustics.sound_names import joined_names
 from avn.core.settings import plain
 from avn.pipeline.benchmark import PAPER_WORLD, changed_settings, compared
+from avn.pipeline.dynamics import GROUPS
 from avn.pipeline.replay import Run
 
 # Settings of the world and of how an agent observes. Others are named only if needed.
 _TELLING = (
-    *("acoustics", "protocol", "sound", "microphone", "split", "subset", "episodes"),
+    *("acoustics", "protocol", "sound", "microphone", *GROUPS, "split", "subset", "episodes"),
     *("look", "localisation", "exploration", "seed", "train_seed"),
 )
 # Settings that a saved config holds resolved, in the parts that read them.
@@ -74,5 +75,7 @@ def _label(key: str) -> str:
 
 
 def _tells(key: str, runs: Sequence[Run]) -> bool:
-    """Return whether the runs that read a setting differ in it."""
+    """Return whether the runs differ in an option of the world, or those that read a setting."""
+    if key.removesuffix(".name") in PAPER_WORLD:
+        return len({plain(run.cfg, key) for run in runs}) > 1
     return len({run.settings[key] for run in runs if key in run.settings}) > 1
