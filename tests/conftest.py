@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 
 import pytest
 import torch
 from hydra.core.global_hydra import GlobalHydra
 
+torch.set_num_threads(1)  # also for what is made once a session
+
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    """One thread for each test process: two that share two cores wait for each other."""
-    if (count := torch.get_num_threads()) != 1 and os.environ.get("AVN_LEAKS"):
-        with open(os.environ["AVN_LEAKS"], "a") as file:
-            file.write(f"{count} before {os.environ['PYTEST_CURRENT_TEST']}\n")
+    """One thread for each test process, whatever the test before has set."""
     torch.set_num_threads(1)
 
 

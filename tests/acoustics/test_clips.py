@@ -22,11 +22,6 @@ from avn.core.errors import UserError
 QUIET = Microphone(noise_rms=0.0)
 
 
-@pytest.fixture(autouse=True)
-def one_thread() -> None:
-    torch.set_num_threads(1)
-
-
 @pytest.fixture(scope="module")
 def bank() -> DrySounds:
     return DrySounds(load_sounds({name: name for name in BUILTIN}))
