@@ -88,6 +88,7 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
     # The schemas import torch and sweeps pandas. Help is answered before and needs neither; for the
     # same reason each command imports from `pipeline/` where it needs it.
     from avn.config import option_files, registry, sweeps
+    from avn.config.row_networks import with_row_networks
 
     registry.register()
     name = f"avn.{config_name}"
@@ -112,7 +113,10 @@ def _run(config_name: str, task: Callable[[DictConfig], Path | None]) -> int:
     job.__module__ = name
     try:
         sweeps.begin()  # of one job or of many: an experiment may be a sweep by itself
-        sys.argv = [sys.argv[0], *arrange(option_files.take_folders(sys.argv[1:]))]
+        arguments = arrange(option_files.take_folders(sys.argv[1:]))
+        if config_name == "train":
+            arguments = with_row_networks(arguments)
+        sys.argv = [sys.argv[0], *arguments]
         _compose_and_do(config_name, job)
         if errors:
             return _report(name, errors[0], explain(errors[0]))

@@ -52,6 +52,13 @@ def option_names(group: str) -> list[str]:
     return sorted({path.stem for place in places for path in (place / group).glob("*.yaml")})
 
 
+def option_file(group: str, option: str) -> Path | None:
+    """Return the file of an option, of the user's folders first; None where there is none."""
+    places = [*map(Path, _folders), conf_folder()]
+    paths = (place / group / f"{option}.yaml" for place in places)
+    return next((path for path in paths if path.is_file()), None)
+
+
 @contextmanager
 def package_only() -> Iterator[None]:
     """Leave the config folders of the command line out of what is composed in the block."""
