@@ -17,7 +17,8 @@ from avn.core.progress import log
 def main(cfg: DictConfig) -> Path:
     """Build what is missing, evaluate each row with each seed, and print the table.
 
-    With `table=conditions` each row is evaluated in each condition.
+    With `table=conditions` each row is evaluated in each condition, except in those that tell it
+    what its network cannot be told.
     """
     from avn.pipeline.reproduction import check_lists
 
@@ -41,9 +42,12 @@ def _conditions(cfg: DictConfig) -> Path:
     """Make the table of rows x conditions."""
     from avn.pipeline.condition_table import tabulate
     from avn.pipeline.reproduction import settings_of
+    from avn.pipeline.told import can_be_told
 
     pairs = [(row, own) for row in dict.fromkeys(cfg.rows) for own in dict.fromkeys(cfg.conditions)]
     composed = {pair: compose_row(cfg, *pair) for pair in pairs}
+    # a row without such a network has no cell; if there is nothing else, it is refused
+    composed = {pair: own for pair, own in composed.items() if can_be_told(own)} or composed
     refuse_unread("reproduce", cfg, settings_of([*composed.values()]))
     return tabulate(cfg, composed)
 

@@ -12,6 +12,7 @@ from torch.utils.data import Dataset
 from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra
 from avn.acoustics.microphone import Microphone
 from avn.core.clip_id import ClipId
+from avn.datamodules.second_sources import SecondSources
 from avn.dataset.scene import AudibleScene, Brirs
 from avn.dataset.source_locations import locate_sources
 from avn.modules.audio_network import ClipBatch
@@ -63,6 +64,8 @@ class ClipSet(Dataset[ClipBatch]):
         Seed of all random draws.
     targets : sequence of (K, S, ...) tensors, optional
         Targets of each apartment; by default the locations of the sources.
+    second : SecondSources, optional
+        Second sources, and what is told of the first ones; by default none, and nothing.
     """
 
     def __init__(
@@ -73,13 +76,15 @@ class ClipSet(Dataset[ClipBatch]):
         purpose: str,
         seed: int,
         targets: Sequence[Tensor] | None = None,
+        second: SecondSources | None = None,
     ) -> None:
         self.scenes = [SceneClips.from_scene(scene) for scene in scenes]
-        self.sounds = sounds
+        self.sounds, self.second = sounds, second
         self.renderer = ClipRenderer(sounds, microphone, seed, purpose)
         shapes = [clips.in_sight.shape for clips in self.scenes]
         grids = [torch.cartesian_prod(torch.arange(k), torch.arange(s)) for k, s in shapes]
         self.source, self.state = torch.cat(grids).unbind(1)
+        self._sources, self._states = torch.tensor(shapes).unbind(1)
         sizes = torch.tensor([len(grid) for grid in grids])
         self.apartment = torch.arange(len(grids)).repeat_interleave(sizes)
         targets = targets or [clips.locations for clips in self.scenes]
@@ -117,16 +122,44 @@ class ClipSet(Dataset[ClipBatch]):
         sound = number % len(self.sounds.names)
         pair = number // len(self.sounds.names)
         realisation, pair = pair // self.pairs, pair % self.pairs
-        # The responses of a pair are transformed once for all of its sounds.
-        pair, index = pair.unique(return_inverse=True)
-        spectra = brir_spectra(self._brirs(pair), self.sounds.rate)
-        source, state = self.source[pair][index], self.state[pair][index]
+        clip = ClipId(self.source[pair], self.state[pair], sound, realisation)
+        heard = self._at_ears(pair, clip)
+        told, mask = torch.zeros_like(number), torch.empty(len(number), 0, 0)
+        if self.second:
+            told, mask = self._add_second(heard, number, pair, clip)
         return ClipBatch(
-            clips=self.renderer.render(spectra, ClipId(source, state, sound, realisation), index),
-            target=self.target[pair][index],
-            in_sight=self.in_sight[pair][index],
+            clips=self.renderer.record(heard, clip),
+            target=self.target[pair],
+            in_sight=self.in_sight[pair],
             sound=sound,
+            told=told,
+            mask=mask,
         )
+
+    def _add_second(
+        self, heard: Tensor, item: Tensor, pair: Tensor, clip: ClipId
+    ) -> tuple[Tensor, Tensor]:
+        """Add second sources to the sound at the ears, in place; return told and mask."""
+        assert self.second is not None
+        apartment = self.apartment[pair]
+        told, source, sound = self.second.draw(
+            item, clip.source, clip.sound, self._sources[apartment]
+        )
+        # pairs of an apartment are ordered by source
+        pair = pair + (source - clip.source) * self._states[apartment]
+        rows = (source >= 0).nonzero()[:, 0]
+        other = torch.zeros_like(heard)
+        if len(rows):
+            second = clip._replace(source=source, sound=sound)
+            other[rows] = self._at_ears(pair[rows], ClipId(*(part[rows] for part in second)))
+        mask = self.second.mask(heard, other)
+        heard += other
+        return told, mask
+
+    def _at_ears(self, pair: Tensor, clip: ClipId) -> Tensor:
+        """Render the sound of N clips at the ears; the responses of a pair are transformed once."""
+        pair, index = pair.unique(return_inverse=True)
+        return self.renderer.at_ears(brir_spectra(self._brirs(pair), self.sounds.rate), clip, index)
 
     def _brirs(self, pair: Tensor) -> Tensor:
         """Gather the impulse responses (N, 2, T) of pairs (N,), each from its apartment."""

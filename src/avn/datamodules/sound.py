@@ -16,6 +16,7 @@ from avn.core.classes import build_part
 from avn.core.errors import UserError
 from avn.core.prefetch import PrefetchLoader
 from avn.datamodules.clip_set import ClipSet
+from avn.datamodules.second_sources import SecondSources
 from avn.dataset.scene import AudibleScene, Scene
 from avn.dataset.source_locations import locate_sources
 from avn.modules.audio_network import PictureBatch
@@ -94,6 +95,8 @@ class PictureSet(Dataset[PictureBatch]):
             target=batch["target"],
             in_sight=batch["in_sight"],
             sound=batch["sound"],
+            told=batch["told"],
+            mask=batch["mask"],
         )
 
 
@@ -157,6 +160,7 @@ class SoundData(L.LightningDataModule):
             return ClipSet(scenes, sounds, microphone, purpose, seed, targets)
 
         self.train_clips = clips(train, "train", seed)
+        self.train_clips.second = self.second_sources()
         self.measured_clips = {
             split: clips(scenes, "eval", VALIDATION_SEED) for split, scenes in self.scenes.items()
         }
@@ -164,6 +168,10 @@ class SoundData(L.LightningDataModule):
     def target_of(self, scene: Scene) -> Tensor:
         """Return the targets of all pairs of source and state of an apartment, (K, S, ...)."""
         return locate_sources(scene)[0]
+
+    def second_sources(self) -> SecondSources | None:
+        """Return the second sources of the training clips; None by default."""
+        return None
 
     def train_dataloader(self) -> PrefetchLoader:
         """Build the loader of the training clips: `sounds_per_pair` for each pair and epoch."""

@@ -68,10 +68,6 @@ class ArrivalCnn(SoundCnn):
         """Number of outputs of the last layer."""
         return self.bins + OTHERS
 
-    def forward(self, clips: Tensor) -> Tensor:
-        """Estimate the source locations of N clips. See `SoundCnn.forward`."""
-        return self.location(self.estimate(self.spectrogram(clips)))
-
     def location(self, outputs: Tensor) -> Tensor:
         """Return the locations (N, 2) in metres of outputs of the last layer."""
         return Arrivals(self.answer(outputs)).location
@@ -89,7 +85,7 @@ class ArrivalCnn(SoundCnn):
         (N, bins + 6) float32 tensor
             See `Arrivals`.
         """
-        return self.answer(self.estimate(self.spectrogram(clips)))
+        return self.answer(self.estimate(self.pictures(clips)))
 
     def answer(self, outputs: Tensor) -> Tensor:
         """Map outputs of the last layer (N, bins + 6) to the numbers of `Arrivals`."""
@@ -116,6 +112,10 @@ class ArrivalCnn(SoundCnn):
     def mirror_targets(self, target: Tensor) -> Tensor:
         """Return the targets of the mirrored clips. See `avn.dataset.arrivals`."""
         return target * target.new_tensor((-1, 1, 1, -1, 1))
+
+    def input_of(self, batch: PictureBatch) -> Tensor:
+        """Return the network's input for a batch: its spectrograms."""
+        return batch["pictures"]
 
     def loss(self, outputs: Tensor, target: Tensor, in_sight: Tensor) -> Tensor:
         """Compute the sum of the losses of the heads.
@@ -151,14 +151,14 @@ class ArrivalCnn(SoundCnn):
 
     def training_step(self, batch: PictureBatch, index: int) -> Tensor:
         """Return the loss, after flip augmentation."""
-        pictures, target = self.random_flip(batch["pictures"], batch["target"])
+        pictures, target = self.random_flip(self.input_of(batch), batch["target"])
         loss = self.loss(self._net(pictures), target, batch["in_sight"])
         self.training_loss.update(loss.detach(), len(target))
         return loss
 
     def validation_step(self, batch: PictureBatch, index: int, dataloader_idx: int = 0) -> None:
         """Add one batch to the metrics of a subset. See `SoundCnn.validation_step`."""
-        outputs = self.estimate(batch["pictures"]).cpu()
+        outputs = self.estimate(self.input_of(batch)).cpu()
         target, in_sight = batch["target"].cpu(), batch["in_sight"].cpu()
         loss = self.loss(outputs, target, in_sight)
         self.losses[dataloader_idx].update(loss, len(target))

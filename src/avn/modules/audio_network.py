@@ -26,12 +26,19 @@ class ClipBatch(TypedDict):
         Whether the source is in the line of sight.
     sound : (N,) int64 tensor
         Index of the sound.
+    told : (N,) int64 tensor
+        Category of the sound that the network is told, from 1; 0 for none.
+    mask : (N, bands, frames) float32 tensor
+        Share of the sound in the power of each band and frame, where there are second sources; else
+        without bands.
     """
 
     clips: Tensor
     target: Tensor
     in_sight: Tensor
     sound: Tensor
+    told: Tensor
+    mask: Tensor
 
 
 class PictureBatch(TypedDict):
@@ -41,7 +48,7 @@ class PictureBatch(TypedDict):
     ----------
     pictures : (N, channels, bands, frames) float32 tensor
         Spectrograms.
-    target, in_sight, sound
+    target, in_sight, sound, told, mask
         As those of `ClipBatch`.
     """
 
@@ -49,6 +56,8 @@ class PictureBatch(TypedDict):
     target: Tensor
     in_sight: Tensor
     sound: Tensor
+    told: Tensor
+    mask: Tensor
 
 
 SPECTROGRAM: Part = {"_target_": "avn.modules.spectrogram.Spectrogram"}
@@ -100,6 +109,8 @@ class AudioNetwork(Network):
 
     unit = "clips"
     mirror_signs: ClassVar[tuple[float, ...]]
+    # Channels of the network's input besides those of the spectrogram.
+    further_channels = 0
 
     def __init__(
         self,
@@ -124,12 +135,11 @@ class AudioNetwork(Network):
         self.check_recipe()
         self.flip_augmentation, self.flip_tta = flip_augmentation, flip_tta
         self.spectrogram: Spectrogram = build_part(spectrogram, self.node, rate=rate)
-        channels, *size = (
-            self.spectrogram.channels,
-            self.spectrogram.bands,
-            self.spectrogram.frames,
-        )
-        shape = {"channels": channels, "height": size[0], "width": size[1]}
+        shape = {
+            "channels": self.spectrogram.channels + self.further_channels,
+            "height": self.spectrogram.bands,
+            "width": self.spectrogram.frames,
+        }
         built = self.build("net", **shape, outputs=self.outputs)
         self.net = built.to(memory_format=torch.channels_last)
 
@@ -148,7 +158,12 @@ class AudioNetwork(Network):
 
     def forward(self, clips: Tensor) -> Tensor:
         """Map clips (N, 2, rate) float32 to outputs (N, outputs) float32."""
-        return self.estimate(self.spectrogram(clips))
+        return self.estimate(self.pictures(clips))
+
+    def pictures(self, clips: Tensor) -> Tensor:
+        """Return the network's input for clips (N, 2, rate): their spectrograms."""
+        found: Tensor = self.spectrogram(clips)
+        return found
 
     def estimate(self, pictures: Tensor) -> Tensor:
         """Map spectrograms (N, channels, bands, frames) to outputs (N, outputs) float32."""

@@ -92,7 +92,7 @@ class Network(L.LightningModule):
 
     def configure_optimizers(self) -> OptimizerLRSchedulerConfig:
         """Build the optimiser of the recipe, with `schedule` applied at every step."""
-        learnt = [weight for weight in self.net.parameters() if weight.requires_grad]
+        learnt = [weight for weight in self.parameters() if weight.requires_grad]
         optimizer = build_part(self.hparams["optimizer"], self.node, params=learnt)
         steps = int(self.trainer.estimated_stepping_batches)
         schedule = LambdaLR(optimizer, rate_factor(self.hparams["schedule"], steps))

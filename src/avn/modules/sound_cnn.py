@@ -51,7 +51,7 @@ class SoundCnn(AudioNetwork):
         (N, 2) float32 tensor
             Metres to the right and to the front.
         """
-        return super().forward(clips)
+        return self.location(super().forward(clips))
 
     def features(self, clips: Tensor) -> Tensor:
         """Return audio embeddings: the last hidden layer and the estimated location.
@@ -75,7 +75,7 @@ class SoundCnn(AudioNetwork):
         net: Any = self.net
         if not (hasattr(net, "hidden") and hasattr(net, "answer")):
             raise UserError(f"sound_model.net: {type(net).__name__} gives no features")
-        pictures = self.spectrogram(clips)
+        pictures = self.pictures(clips)
         both = torch.cat((pictures, self.spectrogram.mirror(pictures)))
         hidden = net.hidden(both.contiguous(memory_format=torch.channels_last))
         straight, mirrored = net.answer(hidden).chunk(2)

@@ -87,6 +87,20 @@ class Spectrogram(nn.Module):
         # In small batches, so that intermediate results stay in a CPU's caches: twice as fast.
         return torch.cat([self._pictures(part) for part in clips.split(TOGETHER)])
 
+    def power(self, clips: Tensor, frames: int) -> Tensor:
+        """Return the power of each band in some frames of clips, (N, 2, bands, frames).
+
+        Parameters
+        ----------
+        clips : (N, 2, rate) float32 tensor
+            Waveforms of the left and the right ear.
+        frames : int
+            Number of frames, a divisor of those of a spectrogram.
+        """
+        spectra = self._stft(clips, self.frames // frames)
+        values = spectra.real.square() + spectra.imag.square()
+        return (values @ self.band_weights).transpose(-1, -2)
+
     def _pictures(self, clips: Tensor) -> Tensor:
         """Map clips (N, 2, rate) to spectrograms (N, channels, bands, frames)."""
         spectra = self._stft(clips)
@@ -104,12 +118,12 @@ class Spectrogram(nn.Module):
         pooled[:, :2] = torch.log10(power.clamp_min(POWER_FLOOR)) + 4.0
         return pooled
 
-    def _stft(self, clips: Tensor) -> Tensor:
-        """Map clips (N, 2, rate) to complex spectra (N, 2, frames, stft_window / 2 + 1)."""
+    def _stft(self, clips: Tensor, every: int = 1) -> Tensor:
+        """Map clips (N, 2, rate) to complex spectra (N, 2, frames / every, stft_window / 2 + 1)."""
         hop = self.rate // self.frames
         # The clip is circular, so its start follows its end and no edge needs padding.
         around = torch.cat((clips, clips[..., : self.window]), -1)
-        windows = around.unfold(-1, self.window, hop)[..., : self.frames, :]
+        windows = around.unfold(-1, self.window, hop)[..., : self.frames : every, :]
         # The scale makes the sum over bins the mean square of the signal.
         scale = math.sqrt(2.0 / (self.window * float(self.hann.square().sum())))
         return torch.fft.rfft(windows * (self.hann * scale))
@@ -119,18 +133,18 @@ class Spectrogram(nn.Module):
 
         Parameters
         ----------
-        pictures : (N, channels, bands, frames) tensor
-            Spectrograms as `forward` gives them.
+        pictures : (N, C, bands, frames) tensor
+            Spectrograms as `forward` gives them; channels that follow are kept.
 
         Returns
         -------
-        (N, channels, bands, frames) tensor
+        (N, C, bands, frames) tensor
             Left and right exchanged; the interaural phase changes its sign.
         """
-        left, right, *coherence = pictures.unbind(1)
-        if coherence:
-            coherence[1] = -coherence[1]
-        return torch.stack((right, left, *coherence), 1)
+        left, right, *others = pictures.unbind(1)
+        if self.interaural:
+            others[1] = -others[1]
+        return torch.stack((right, left, *others), 1)
 
 
 def band_weights(rate: int, window: int, bands: int, scale: str) -> Tensor:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from avn.core.errors import UserError
-from avn.core.random import scramble
+from avn.core.second_source import draw_second_source
 
 
 class Distractor:
@@ -23,10 +22,12 @@ class Distractor:
     ----------
     categories : mapping of str to str
         Category of each sound of the test world by name.
+    told : bool
+        Whether the agent is told the category of the goal's sound.
     """
 
-    def __init__(self, categories: Mapping[str, str]) -> None:
-        self.categories = dict(categories)
+    def __init__(self, categories: Mapping[str, str], told: bool = False) -> None:
+        self.categories, self.told = dict(categories), told
 
     def check(self, sources: int, sounds: Sequence[str]) -> None:
         """Refuse an apartment without a place for a distractor, and sounds without another.
@@ -78,11 +79,5 @@ class Distractor:
             See `check`.
         """
         self.check(sources, sounds)
-        categories = np.array([self.categories[name] for name in sounds])
-        other_category = categories[:, None] != categories[None, :]
-        step = 1 + (scramble(keys, 0) % np.uint64(sources - 1)).astype(np.int64)
-        # the n-th of the sounds of another category
-        count = other_category.sum(1)[sound].astype(np.uint64)
-        order = np.argsort(~other_category, axis=1, kind="stable")
-        other = order[sound, (scramble(keys, 1) % count).astype(np.int64)]
-        return torch.from_numpy((source + step) % sources), torch.from_numpy(other)
+        categories = [self.categories[name] for name in sounds]
+        return draw_second_source(keys, source, sound, sources, categories)

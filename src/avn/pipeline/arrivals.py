@@ -20,11 +20,11 @@ class ArrivalEstimates(HeardBySoundModel):
 
     kind = "hear/arrivals"
 
-    def output_of(self, model: Any) -> Callable[[Tensor], Tensor]:
-        """Return the function from clips to the outputs of the heads."""
+    def output_of(self, model: Any) -> Callable[..., Tensor]:
+        """Return the function from clips, and what is told, to the outputs of the heads."""
 
-        def heads(clips: Tensor) -> Tensor:
-            found: Tensor = model.arrival(clips)
+        def heads(clips: Tensor, *told: Tensor) -> Tensor:
+            found: Tensor = model.arrival(clips, *told)
             return found.to(torch.float16)
 
         return heads

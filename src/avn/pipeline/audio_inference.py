@@ -103,9 +103,9 @@ class AudioInference(ApartmentTensors):
     def network(self) -> Any:
         """Stage of the network, with the sampling rate `rate` of its clips."""
 
-    def output_of(self, model: Any) -> Callable[[Tensor], Tensor]:
+    def output_of(self, model: Any) -> Callable[..., Tensor]:
         """Return the function from a batch of clips to outputs; the model by default."""
-        forward: Callable[[Tensor], Tensor] = model
+        forward: Callable[..., Tensor] = model
         return forward
 
     @property

@@ -7,11 +7,10 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from avn.acoustics.sound_table import packaged_sounds
 from avn.apartments.floor_plan import FloorPlan
 from avn.core.classes import build_object
 from avn.navigation.dynamics import Dynamics
-from avn.pipeline.sounds import sound_files
+from avn.pipeline.sounds import sound_categories, sound_files
 
 # Groups of the config, as the attributes of `Dynamics`, and the options by which nothing changes.
 STEADY = {"schedule": "continuous", "distractor": "none", "odometry": "exact"}
@@ -25,7 +24,7 @@ def changing(cfg: DictConfig) -> tuple[str, ...]:
 
 def build_dynamics(cfg: DictConfig) -> Dynamics:
     """Build what changes in the course of an episode; raise `UserError` for an invalid setting."""
-    given: dict[str, dict[str, Any]] = {"distractor": {"categories": _categories(cfg)}}
+    given: dict[str, dict[str, Any]] = {"distractor": {"categories": sound_categories(cfg)}}
     return Dynamics(
         **{
             group: build_object(group, cfg[group], **given.get(group, {}))
@@ -39,12 +38,3 @@ def check_dynamics(cfg: DictConfig, plans: Sequence[FloorPlan]) -> None:
     if distractor := build_dynamics(cfg).distractor:
         for plan in plans:
             distractor.check(len(plan.sources), list(sound_files(cfg)))
-
-
-def _categories(cfg: DictConfig) -> dict[str, str]:
-    """Return the category of each sound; a file of the user is a category of its own."""
-    table = packaged_sounds()
-    return {
-        name: table[path].category if path in table else name
-        for name, path in sound_files(cfg).items()
-    }

@@ -6,7 +6,7 @@ one of many sounds each hear a small part of all clips, so the network is applie
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -17,9 +17,10 @@ from avn.core.clip_id import ClipId
 from avn.core.prefetch import prefetch, threads_for_one_operation
 from avn.core.sound_mix import SoundMix
 from avn.pipeline.audio_inference import AudioInference
-from avn.pipeline.rendered_audio import RenderedClips, Waveforms, batches
+from avn.pipeline.rendered_audio import Output, RenderedClips, Waveforms, batches
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.stage import Stage
+from avn.pipeline.told import is_told, told_categories
 
 # Clips computed at once, for the caches of a CPU.
 _BATCH = 32
@@ -66,17 +67,23 @@ class LiveInference(Waveforms):
         """Refuse what the table refuses."""
         self._table.check()
 
-    def output(self) -> tuple[Callable[[Tensor], Tensor], tuple[int, ...]]:
-        """Return the function from clips (N, 2, rate) to outputs, and the shape of one."""
+    def output(self) -> tuple[Output, tuple[int, ...]]:
+        """Return the function from clips to outputs, and the shape of one output.
+
+        Where the agent is told the category of the goal's sound, the network is told it.
+        """
         model = self._table.network.load()
         model.eval()
         forward = self._table.output_of(model)
+        told = told_categories(self.cfg) if is_told(self.cfg) else None
 
         @torch.inference_mode()
-        def outputs(clips: Tensor) -> Tensor:
-            return forward(clips.to(model.device)).cpu().float()
+        def outputs(clips: Tensor, sound: Tensor) -> Tensor:
+            given = () if told is None else (told[sound].to(model.device),)
+            return forward(clips.to(model.device), *given).cpu().float()
 
-        return outputs, tuple(outputs(torch.zeros(1, 2, self._rate)).shape[1:])
+        example = torch.zeros(1, 2, self._rate), torch.zeros(1, dtype=torch.int64)
+        return outputs, tuple(outputs(*example).shape[1:])
 
 
 class RememberedClips(RenderedClips):

@@ -30,6 +30,7 @@ from avn.pipeline.scenes import acoustics_of
 from avn.pipeline.sound_network import SourceEstimates, has_sound_model, hears_arrivals
 from avn.pipeline.sounds import sound_files
 from avn.pipeline.stop_classifier import StopProbabilities, has_stop_model
+from avn.pipeline.told import check_told
 from avn.pipeline.views import RenderedViews
 from avn.pipeline.visual_features import VisualEmbeddings
 
@@ -247,6 +248,7 @@ class Observed:
         UserError
             For such an observation, or an entry of `agent.oracle_inputs` without any effect.
         """
+        check_told(self.cfg, agent, [name for name in wanted if not self.is_true(name)])
         for truth in self._truth:
             shown = [
                 name for name, observation in OBSERVATIONS.items() if observation.truth == truth

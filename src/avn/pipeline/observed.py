@@ -16,7 +16,7 @@ from avn.core.clip_id import ClipId
 from avn.navigation.trace import Trace
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import Clips
-from avn.pipeline.rendered_audio import RenderedClips
+from avn.pipeline.rendered_audio import RenderedClips, unchanged
 from avn.pipeline.replay import Run
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds
@@ -53,7 +53,7 @@ class RunObservations:
         renderer = ClipRenderer(dry_sounds(cfg), microphone, clips.seed_of(cfg), clips.purpose)
         shape = 2, renderer.sounds.rate
         self._clips = {
-            name: RenderedClips(scene, renderer, cfg.realisations, lambda clips: clips, shape)
+            name: RenderedClips(scene, renderer, cfg.realisations, unchanged, shape)
             for name, scene in self._scenes.items()
         }
 

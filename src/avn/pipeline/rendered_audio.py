@@ -30,6 +30,14 @@ from avn.pipeline.stage import Stage
 # Clips rendered at once, for the caches of a CPU.
 _BATCH = 64
 
+# Function from clips and the index of the sound of each to observations.
+Output = Callable[[Tensor, Tensor], Tensor]
+
+
+def unchanged(clips: Tensor, sound: Tensor) -> Tensor:
+    """Return clips as they are; an `Output`."""
+    return clips
+
 
 class Waveforms(Stage):
     """Stage of the waveforms of clips. It has no file of its own: it reads those of its need.
@@ -92,9 +100,9 @@ class Waveforms(Stage):
     def make(self) -> None:
         """Make nothing; the acoustics are made before."""
 
-    def output(self) -> tuple[Callable[[Tensor], Tensor], tuple[int, ...]]:
-        """Return the function from clips (N, 2, rate) to observations, and the shape of one."""
-        return (lambda clips: clips), (2, self._rate)
+    def output(self) -> tuple[Output, tuple[int, ...]]:
+        """Return the function from clips to observations, and the shape of one observation."""
+        return unchanged, (2, self._rate)
 
     @property
     def _rate(self) -> int:
@@ -133,7 +141,7 @@ class Spectrograms(Waveforms):
         super().check()
         self.output()
 
-    def output(self) -> tuple[Callable[[Tensor], Tensor], tuple[int, ...]]:
+    def output(self) -> tuple[Output, tuple[int, ...]]:
         """Return the spectrogram, and the shape (channels, bands, frames)."""
         found: Spectrogram
         if self._config:
@@ -141,7 +149,8 @@ class Spectrograms(Waveforms):
             found = build_part(settings, "sound_model", rate=self._rate)
         else:
             found = Spectrogram(rate=self._rate)
-        return found, (found.channels, found.bands, found.frames)
+        shape = found.channels, found.bands, found.frames
+        return (lambda clips, sound: found(clips)), shape
 
 
 class RenderedClips:
@@ -156,7 +165,8 @@ class RenderedClips:
     realisations : int
         Number of realisations of each clip.
     output : callable
-        Function from clips (N, 2, rate) to observations (N, ...).
+        Function from clips (N, 2, rate) and the index of the sound of each (N,) to observations
+        (N, ...).
     shape : tuple of int
         Shape of one observation.
     """
@@ -166,7 +176,7 @@ class RenderedClips:
         scene: AudibleScene,
         renderer: ClipRenderer,
         realisations: int,
-        output: Callable[[Tensor], Tensor],
+        output: Output,
         shape: tuple[int, ...],
     ) -> None:
         self._brirs, self._renderer, self._output = scene.brirs, renderer, output
@@ -193,7 +203,7 @@ class RenderedClips:
         return torch.cat([self._rendered(*part) for part in batches(clip, mix, _BATCH)])
 
     def _rendered(self, clip: ClipId, mix: SoundMix | None = None) -> Tensor:
-        return self._output(self._renderer.record(self.at_ears(clip, mix), clip))
+        return self._output(self._renderer.record(self.at_ears(clip, mix), clip), clip.sound)
 
     def at_ears(self, clip: ClipId, mix: SoundMix | None = None) -> Tensor:
         """Return the sound at the ears, without microphones, (N, 2, rate) float32."""

@@ -13,9 +13,10 @@ from avn.acoustics.heads import head_content
 from avn.core.classes import build_object, import_class
 from avn.core.errors import UserError
 from avn.core.hashing import digest
-from avn.pipeline.apartments import Apartments
+from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.scenes import acoustics_of
+from avn.pipeline.sounds import sound_categories
 from avn.pipeline.stage import Stage
 from avn.pipeline.trained_on_clips import TrainedOnClips
 
@@ -84,7 +85,8 @@ class SoundNetwork(TrainedOnClips):
         from avn.datamodules.sound import SoundData
 
         if hears_arrivals(self.cfg):
-            return ArrivalData(acoustics_of(self.train), **self.clips())
+            categories = list(sound_categories(self.cfg, TRAINING).values())
+            return ArrivalData(acoustics_of(self.train), categories, **self.clips())
         return SoundData(**self.clips())
 
     def callbacks(self) -> Sequence[Callback]:

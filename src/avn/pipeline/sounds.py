@@ -9,6 +9,7 @@ from omegaconf import DictConfig, OmegaConf
 from avn.acoustics.clips import DrySounds
 from avn.acoustics.dry_sounds import content_hash, load_sounds
 from avn.acoustics.sound_names import name_sounds
+from avn.acoustics.sound_table import packaged_sounds
 from avn.core.errors import UserError
 from avn.core.files import check_name
 from avn.core.settings import plain
@@ -42,3 +43,12 @@ def dry_sounds(cfg: DictConfig, world: WorldKeys = TEST) -> DrySounds:
 def sounds_content(cfg: DictConfig, world: WorldKeys = TEST) -> list[Any]:
     """Return the names of a world's sounds in order, each with the hash of its recording."""
     return list(content_hash(sound_files(cfg, world)).items())
+
+
+def sound_categories(cfg: DictConfig, world: WorldKeys = TEST) -> dict[str, str]:
+    """Return the category of each sound; a file of the user is a category of its own."""
+    table = packaged_sounds()
+    return {
+        name: table[path].category if path in table else name
+        for name, path in sound_files(cfg, world).items()
+    }
