@@ -1,7 +1,7 @@
 """Small worlds for tests: settings with which a command on the mini split takes seconds."""
 
 from copy import deepcopy
-from functools import lru_cache
+from functools import cache
 
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
@@ -62,7 +62,7 @@ def composed(*overrides, command="eval", compose=compose):
         return compose(command, overrides=[*overrides])
 
 
-@lru_cache
+@cache
 def _option(group, option):
     return composed(f"{group}={option}")[group]
 
@@ -75,6 +75,7 @@ def option(group, name, **changes):
     return found
 
 
+@cache  # the tests of a file ask for the same ones again and again
 def fitting(chosen, *settings):
     """Those settings that a run reads, for a command refuses the others.
 
