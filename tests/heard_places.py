@@ -56,17 +56,17 @@ def heard(scene: DrawnScene) -> Tensor:
 def run(
     agent: PlannerAgent, protocol: Protocol, arrival: Tensor | None = None, drawing: str = FLAT
 ) -> pd.DataFrame:
-    """Records of an agent from a third of all starts in a drawn apartment; it sees all ahead."""
+    """Records of an agent from a fifth of all starts in a drawn apartment; it sees all ahead."""
     scene = draw("flat", drawing)
     audio = {"arrival": heard(scene) if arrival is None else arrival}
     goal = torch.from_numpy(protocol.goal_cells(scene.grid, np.asarray(scene.sources)))
     audio["stop_probability"] = goal.repeat_interleave(4, dim=1)[:, :, None, None].float()
     seen = {"local_patch": torch.from_numpy(window_cells(scene.grid) >= 0).float()}
     every = exhaustive_episodes(scene, ["ring"], protocol, seed=0)
-    # of all four headings, as 3 and 4 have no common factor
+    # of all four headings, as 5 and 4 have no common factor
     names = ("number", "sound", "source", "start", "trajectory_index")
-    third = {name: getattr(every, name)[::3] for name in names}
-    episodes = dataclasses.replace(every, **third)
+    fifth = {name: getattr(every, name)[::5] for name in names}
+    episodes = dataclasses.replace(every, **fifth)
     observations = SceneObservations(audio, seen)
     labels = Labels("an agent", "diffraction")
     return rollout_scene(agent, scene, episodes, protocol, labels, observations)

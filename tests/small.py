@@ -22,6 +22,7 @@ SMALL = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
+    "sound_model.validation_clips=100",
     "realisations=2",
     "protocol.num_starts=4",
     "sound=[alarm,clock]",
@@ -39,6 +40,8 @@ EYES = (
     "occupancy_model.times=1",
     "occupancy_model.validation_views=40",
 )
+# Trainings whose curves and figures no test looks at.
+QUIET = ("logger=none",)
 # An actor-critic row that has learnt nothing.
 A3C = (
     "protocol.exploration_steps=30",
