@@ -52,8 +52,14 @@ def composed_once() -> Iterator[None]:
             raise known
         return load(loader, config_name, overrides, *given, **options) if known is None else known
 
-    Hydra.get_mode, ConfigLoaderImpl.load_configuration = get_mode, load_configuration
+    changed: list[tuple[type, str, Any, Any]] = [
+        (Hydra, "get_mode", get_mode, mode),
+        (ConfigLoaderImpl, "load_configuration", load_configuration, load),
+    ]
+    for owner, name, ours, _ in changed:
+        setattr(owner, name, ours)
     try:
         yield
     finally:
-        Hydra.get_mode, ConfigLoaderImpl.load_configuration = mode, load
+        for owner, name, _, theirs in changed:
+            setattr(owner, name, theirs)
