@@ -40,7 +40,8 @@ EYES = (
     "occupancy_model.times=1",
     "occupancy_model.validation_views=40",
 )
-# Trainings whose curves and figures no test looks at.
+# Trainings whose curves no test looks at. A test that does needs networks of its own, for a network
+# that another file has trained has none.
 QUIET = ("logger=none",)
 # An actor-critic row that has learnt nothing.
 A3C = (

@@ -7,12 +7,12 @@ import h5py
 import pandas as pd
 import pytest
 import torch
-from small import SMALL, composed, fitting
+from small import QUIET, SMALL, composed, fitting
 
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.scenes import DirectSound
 
-WORLD = [own for own in SMALL if not own.startswith("sound=")]
+WORLD = [*QUIET, *(own for own in SMALL if not own.startswith("sound="))]
 
 
 @pytest.fixture(scope="module")
