@@ -43,11 +43,11 @@ class Readers:
         if run in self.nodes:
             return names
         nodes = self.nodes[run] = set()
-        for stage in _stages(run[0], composed(*run)):
-            names.add(type(stage).__name__)
-            for leaf in stage.read_here():
+        for stage, read in _stages(run[0], composed(*run)):
+            names.add(stage.__name__)
+            for leaf in read:
                 nodes.add(leaf.partition(".")[0])
-                self.by_leaf.setdefault(leaf, set()).add(type(stage).__name__)
+                self.by_leaf.setdefault(leaf, set()).add(stage.__name__)
         self.stages |= names
         return names
 
@@ -128,9 +128,9 @@ def _has(cfg: DictConfig, key: str) -> bool:
     return isinstance(holder, DictConfig) and key.rpartition(".")[2] in holder
 
 
-def _stages(command: str, cfg: DictConfig) -> list[Stage]:
-    """List the stages of a run; none if its settings are not compatible."""
-    found: dict[tuple[type, frozenset[str]], Stage] = {}
+def _stages(command: str, cfg: DictConfig) -> set[tuple[type[Stage], frozenset[str]]]:
+    """Return the stages of a run with what they read; none if its settings are not compatible."""
+    found: set[tuple[type[Stage], frozenset[str]]] = set()
     try:
         if command == "eval":
             left: list[Stage] = [Evaluation(cfg)]
@@ -143,8 +143,8 @@ def _stages(command: str, cfg: DictConfig) -> list[Stage]:
             # no fingerprints, for which weights of optional packages would have to be there
             key = type(stage), frozenset(stage.read_here())
             if key not in found:
-                found[key] = stage
+                found.add(key)
                 left.extend(stage.needed)
     except UserError:
-        return []
-    return list(found.values())
+        return set()
+    return found

@@ -15,7 +15,7 @@ from avn.agents.rollout import Labels, rollout_scene
 from avn.apartments.local_patch import window_cells
 from avn.core.heard import bearing_label
 from avn.dataset.source_locations import locate_sources, to_headings
-from avn.navigation.episodes import exhaustive_episodes
+from avn.navigation.episodes import Episodes, exhaustive_episodes
 from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
@@ -53,6 +53,13 @@ def heard(scene: DrawnScene) -> Tensor:
     return torch.stack(found)[:, :, None, None]
 
 
+def third_of_starts(scene: DrawnScene, protocol: Protocol) -> Episodes:
+    """A third of all starts, of all four headings, as 3 and 4 have no common factor."""
+    every = exhaustive_episodes(scene, ["ring"], protocol, seed=0)
+    names = ("number", "sound", "source", "start", "trajectory_index")
+    return dataclasses.replace(every, **{name: getattr(every, name)[::3] for name in names})
+
+
 def run(
     agent: PlannerAgent, protocol: Protocol, arrival: Tensor | None = None, drawing: str = FLAT
 ) -> pd.DataFrame:
@@ -62,11 +69,7 @@ def run(
     goal = torch.from_numpy(protocol.goal_cells(scene.grid, np.asarray(scene.sources)))
     audio["stop_probability"] = goal.repeat_interleave(4, dim=1)[:, :, None, None].float()
     seen = {"local_patch": torch.from_numpy(window_cells(scene.grid) >= 0).float()}
-    every = exhaustive_episodes(scene, ["ring"], protocol, seed=0)
-    # of all four headings, as 3 and 4 have no common factor
-    names = ("number", "sound", "source", "start", "trajectory_index")
-    third = {name: getattr(every, name)[::3] for name in names}
-    episodes = dataclasses.replace(every, **third)
+    episodes = third_of_starts(scene, protocol)
     observations = SceneObservations(audio, seen)
     labels = Labels("an agent", "diffraction")
     return rollout_scene(agent, scene, episodes, protocol, labels, observations)

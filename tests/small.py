@@ -1,7 +1,7 @@
 """Small worlds for tests: settings with which a command on the mini split takes seconds."""
 
 from copy import deepcopy
-from functools import lru_cache
+from functools import cache
 
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
@@ -22,6 +22,7 @@ SMALL = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
+    "sound_model.validation_clips=100",
     "realisations=2",
     "protocol.num_starts=4",
     "sound=[alarm,clock]",
@@ -39,6 +40,9 @@ EYES = (
     "occupancy_model.times=1",
     "occupancy_model.validation_views=40",
 )
+# Trainings whose curves no test looks at. A test that does needs networks of its own, for a network
+# that another file has trained has none.
+QUIET = ("logger=none",)
 # An actor-critic row that has learnt nothing.
 A3C = (
     "protocol.exploration_steps=30",
@@ -62,7 +66,7 @@ def composed(*overrides, command="eval", compose=compose):
         return compose(command, overrides=[*overrides])
 
 
-@lru_cache
+@cache
 def _option(group, option):
     return composed(f"{group}={option}")[group]
 
@@ -75,6 +79,7 @@ def option(group, name, **changes):
     return found
 
 
+@cache  # the tests of a file ask for the same ones again and again
 def fitting(chosen, *settings):
     """Those settings that a run reads, for a command refuses the others.
 

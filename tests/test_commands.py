@@ -19,6 +19,7 @@ SMALL = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
+    "sound_model.validation_clips=100",
     "realisations=1",
     "renderer.camera.size=32",
     "renderer.samples=1",

@@ -15,6 +15,7 @@ FAST = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
+    "sound_model.validation_clips=100",
     "realisations=1",
     "protocol.num_starts=4",
 )
@@ -27,6 +28,7 @@ LONG = ("cleanrl_ppo.py", "torchrl_ppo.py")
 WORLD = (
     *SMALL[:4],
     "sound_model.epochs=1",
+    "sound_model.validation_clips=100",
     "algorithm.realisations=1",
     "renderer.camera.size=32",
     "renderer.samples=1",

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 import torch
 import yaml
-from small import A3C, EYES, SMALL, fitting
+from small import A3C, EYES, QUIET, SMALL, fitting
 
 from avn.acoustics.microphone import Microphone
 from avn.config.cli import command
@@ -31,7 +31,7 @@ def run(own, command, outputs):
 
     def go(name, chosen, *options):
         where = ("--config-dir", str(own / "conf"), f"outputs={outputs}")
-        shared = [*SMALL, *EYES, *A3C]
+        shared = [*SMALL, *EYES, *A3C, *QUIET]
         if "renderer=stripes" in options:  # which has a camera and no light
             shared = [own for own in shared if not own.startswith(("renderer.l", "renderer.s"))]
         settings = fitting(chosen, *shared)

@@ -11,10 +11,13 @@ from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData
 
 from avn import figures
 
+# Networks of this file alone: the trainings of other files write no curves.
+OWN = ("sound_model.patience=7", "occupancy_model.patience=7")
+
 
 def made(command, outputs, agent):
     eyes = EYES if agent == "plan_noexp" else ()
-    settings = fitting(f"agent={agent}", *SMALL, *eyes)
+    settings = fitting(f"agent={agent}", *SMALL, *eyes, *OWN)
     code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}")
     assert code == 0, err
     return out[-1]

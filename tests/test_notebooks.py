@@ -23,13 +23,13 @@ SHOWN = {
     "4_your_own_apartment.ipynb": ("home.json: sources[0]", "home: ", "spl"),
     "5_reading_a_run.ipynb": ("image/png", "difference"),
 }
-OPTIONS = {"acoustics": "resonance", "renderer": "raycast"}
+OPTIONS = {"acoustics": "resonance", "renderer": "raycast", "sound_model": "cnn5"}
 WORLD = "WORLD = ["
 
 
 @pytest.fixture(scope="module")
 def small_options(tmp_path_factory):
-    """A config folder in which the package's acoustics and renderer are those of small worlds."""
+    """A config folder in which the package's own options are those of small worlds."""
     folder = tmp_path_factory.mktemp("small")
     for group, option in OPTIONS.items():
         own = [given.removeprefix(f"{group}.") for given in SMALL if given.startswith(f"{group}.")]

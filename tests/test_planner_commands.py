@@ -6,12 +6,14 @@ import h5py
 import pandas as pd
 import pytest
 from omegaconf import OmegaConf
-from small import EYES, SMALL, fitting
+from small import EYES, QUIET, SMALL, fitting
 
 # One take of each clip of one sound.
 WORLD = (
     *(own for own in SMALL if not own.startswith(("sound=", "realisations="))),
+    *QUIET,
     "stop_model.epochs=1",
+    "stop_model.validation_clips=100",
     "realisations=1",
     "sound=alarm",
     "protocol.max_actions=80",  # agents that have learnt nothing use them up

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -19,10 +20,18 @@ from avn.planning.arrival_belief import ArrivalBelief
 from avn.planning.settings import ArrivalModel
 
 
+def run_of(protocol: Protocol, look: str) -> pd.DataFrame:
+    return run(BeliefAgent(OccupancyMapper(SIZE), look=look, obstacle_threshold=0.01), protocol)
+
+
+# Records that several tests look at.
+made = cache(run_of)
+
+
 @pytest.mark.parametrize("protocol", [VAR, STOP], ids=["var", "stop"])
 @pytest.mark.parametrize("look", ["once", "around"])
 def test_with_true_senses_it_arrives_by_nearly_shortest_paths(protocol: Protocol, look: str):
-    frame = run(BeliefAgent(OccupancyMapper(SIZE), look=look, obstacle_threshold=0.01), protocol)
+    frame = made(protocol, look)
     assert frame["success"].mean() > 0.97
     assert frame["spl"].mean() > 0.9
 
@@ -66,10 +75,7 @@ def test_it_hears_all_headings_before_it_stops():
 
 
 def test_equal_runs_have_equal_records():
-    frames = [
-        run(BeliefAgent(OccupancyMapper(SIZE), obstacle_threshold=0.01), STOP) for _ in range(2)
-    ]
-    pd.testing.assert_frame_equal(*frames)
+    pd.testing.assert_frame_equal(made(STOP, "once"), run_of(STOP, "once"))
 
 
 def test_settings_without_effect_are_named():

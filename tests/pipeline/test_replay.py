@@ -7,7 +7,7 @@ import pytest
 import torch
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
-from small import A3C, EYES, SMALL, composed, fitting
+from small import A3C, EYES, QUIET, SMALL, composed, fitting
 
 from avn.config import saved
 from avn.config.defaults import default_config
@@ -30,7 +30,8 @@ def open_run(folder):
 def made(command, outputs, agent, *more):
     eyes = EYES if agent in ("plan_noexp", "belief") or agent.endswith("mapper") else ()
     eyes += A3C if agent.startswith("a3c") else ()
-    settings = fitting(f"agent={agent}", *SMALL, *eyes)
+    # agents that have learnt nothing use up their actions
+    settings = fitting(f"agent={agent}", *SMALL, *eyes, *QUIET, "protocol.max_actions=80")
     code, out, err = command("eval", f"agent={agent}", *settings, f"outputs={outputs}", *more)
     assert code == 0, err
     return Path(out[-1])

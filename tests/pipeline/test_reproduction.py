@@ -1,7 +1,7 @@
 """The plan of a table: what is made once, in which order, and that nothing is left out."""
 
 import pytest
-from small import A3C, EYES, SMALL, composed
+from small import A3C, EYES, QUIET, SMALL, composed
 
 from avn.config.spare import compose_fitting
 from avn.pipeline.occupancy import OccupancyNetwork
@@ -15,7 +15,7 @@ ALL_ROWS = ("greedy", "a3c_va", "a3c_va_m_mapper", "plan_noexp")
 @pytest.fixture
 def plan(tmp_path):
     def steps(*rows, seeds=(0,), networks=(0,), options=()):
-        shared = (*SMALL, *options, f"outputs={tmp_path}")
+        shared = (*SMALL, *QUIET, *options, f"outputs={tmp_path}")
         return missing(
             Evaluation(
                 composed(

@@ -90,7 +90,7 @@ def t_maze_success(memory: int) -> float:
     )
     worker.env.begin(torch.ones(16, dtype=torch.bool))
     worker.collector.restart()
-    for _ in range(900):
+    for _ in range(700):
         worker.update()
     worker.episode_stats.metrics()
     for _ in range(60):

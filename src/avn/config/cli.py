@@ -27,6 +27,7 @@ from avn.config import renamed, spare
 from avn.config.audio_source import choices, name_files, quoted
 from avn.config.folder import conf_folder, without_folders
 from avn.config.help import help_text, is_asked
+from avn.config.one_composition import composed_once
 from avn.config.option_files import option_names
 from avn.core import numerics
 from avn.core.errors import UserError
@@ -135,7 +136,8 @@ def _compose_and_do(config_name: str, job: Callable[[DictConfig], None]) -> None
     )(job)
     while True:
         try:
-            composed()
+            with composed_once():
+                composed()
             return
         except ConfigCompositionException as error:
             if not spare.set_aside(sys.argv, error, everything=config_name == "reproduce"):

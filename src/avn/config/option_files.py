@@ -46,6 +46,11 @@ def take_folders(arguments: list[str]) -> list[str]:
     return rest
 
 
+def only_package() -> bool:
+    """Return whether the command line has no config folder of the user."""
+    return not _folders
+
+
 def option_names(group: str) -> list[str]:
     """Return the names of the options of a group, those of the user's folders among them."""
     places = [*map(Path, _folders), conf_folder()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
 from hydra import compose
@@ -11,7 +12,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
 from omegaconf import DictConfig
 
-from avn.config import spare
+from avn.config import option_files, spare
 from avn.core.errors import UserError
 from avn.core.settings import leaves, plain
 
@@ -55,7 +56,7 @@ def refuse_unread(
     if not suspects:
         return
     chosen = [override for override in given if override.split("=")[0] in _CHOOSE]
-    default = compose(command, overrides=chosen)
+    default = _default(command, *chosen)
     for override in suspects:
         key = _key(override)
         if not leaves(cfg, [key]):  # sets keys of other nodes, such as debug=overfit
@@ -65,6 +66,18 @@ def refuse_unread(
         changed = _changed(cfg, default, [key])
         if changed and not changed & set(read):
             raise _unread(command, key, cfg, read)
+
+
+def _default(command: str, *chosen: str) -> DictConfig:
+    """Compose what is chosen; of the package's own files, whose content stays, once a process."""
+    return _composed(command, chosen) if option_files.only_package() else _compose(command, chosen)
+
+
+def _compose(command: str, overrides: tuple[str, ...]) -> DictConfig:
+    return compose(command, overrides=[*overrides])
+
+
+_composed = lru_cache(maxsize=32)(_compose)
 
 
 def _changed(cfg: DictConfig, default: DictConfig, keys: Sequence[Any]) -> set[str]:

@@ -98,11 +98,12 @@ def _referred(
     for count in range(len(parts) if last else 1, len(parts) + 1):
         node = ".".join(parts[:count])
         holder = OmegaConf.select(cfg, ".".join(parts[: count - 1])) if count > 1 else cfg
-        if not isinstance(holder, DictConfig) or parts[count - 1] not in holder:
+        # `in holder` would follow the reference
+        if not isinstance(holder, DictConfig) or parts[count - 1] not in holder.keys():  # noqa: SIM118
             return
         if OmegaConf.is_interpolation(holder, parts[count - 1]):
-            raw: Any = OmegaConf.to_container(holder, resolve=False)
-            for other in _REFERENCE.findall(str(raw[parts[count - 1]])):
+            raw = holder._get_node(parts[count - 1])._value()  # type: ignore[union-attr]
+            for other in _REFERENCE.findall(str(raw)):
                 moved = {other + k[len(node) :] for k in ignored if k.startswith(f"{node}.")}
                 yield other + key[len(node) :], moved
 
