@@ -10,15 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.actions import HEADINGS
+from avn.planning.field_search import LONGEST, STRAIGHT
 from avn.planning.searched import Searched
 from avn.planning.settings import ArrivalModel
-from avn.planning.sound_fields import SQUARES, sound_fields
+from avn.planning.sound_fields import SQUARES, SoundFields
 
 # Weight below which evidence is left out.
 _LEAST_WEIGHT = 1e-3
 _LEAST_PRECISION = 1e-6
 # Length in units of `sound_fields` up to which logarithms are tabulated.
 _LENGTHS = 4096
+# Agents whose posteriors are taken together where a step needs copies of them.
+_TOGETHER = 16
 # Standard deviations at which the error of a length is cut off, so that no outlier decides.
 _OUTLIER = 4.0
 
@@ -61,11 +64,7 @@ class ArrivalBelief(Searched):
         self._bearing = np.zeros((n, slots, HEADINGS, bins), dtype=np.float32)
         self._distance = np.zeros((n, slots, HEADINGS, 2), dtype=np.float32)
         self._count = np.zeros((n, slots, HEADINGS), dtype=np.float32)
-        # fields of the places, and whether they are those of the present graph
-        self._length = np.zeros((n, slots, size, size), dtype=np.int16)
-        self._direction = np.full((n, slots, size, size), bins, dtype=np.uint8)
-        self._valid = np.zeros((n, slots), dtype=np.bool_)
-        self._blocked = np.zeros((n, size, size), dtype=np.bool_)
+        self._fields = SoundFields(n, slots, size, model.reach, bins)
 
     def hear(
         self,
@@ -99,7 +98,7 @@ class ArrivalBelief(Searched):
         self._weight[moved] *= self.model.kept
         place = moved, self._newest[moved]
         self._position[place], self._weight[place] = pose[moved, :2], 1.0
-        self._valid[place] = False
+        self._fields.forget(*place)
         for own in (self._bearing, self._distance, self._count):
             own[place] = 0.0
         heading = pose[rows, 2]
@@ -119,8 +118,8 @@ class ArrivalBelief(Searched):
     def score(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> None:
         """Compute the posterior on the graphs of now.
 
-        The fields of earlier places are computed anew only where a square has become a node, or is
-        none any more.
+        The fields of earlier places are repaired only where a square has become a node, or is none
+        any more.
 
         Parameters
         ----------
@@ -129,22 +128,8 @@ class ArrivalBelief(Searched):
         active : (N,) bool
             Agents to update.
         """
-        blocked = np.isinf(cost)
-        self._valid[(blocked != self._blocked).any((1, 2))] = False
-        self._blocked = blocked
         kept = (self._weight > _LEAST_WEIGHT) & active[:, None]
-        stale_row, stale_slot = np.nonzero(kept & ~self._valid)
-        sound_fields(
-            cost,
-            self._position,
-            stale_row,
-            stale_slot,
-            self.model.reach,
-            self.bins,
-            self._length,
-            self._direction,
-        )
-        self._valid[stale_row, stale_slot] = True
+        self._fields.update(cost, self._position, kept, active)
         row, slot = np.nonzero(kept)
         bearing = np.zeros((*kept.shape, self.bins + 1), dtype=np.float32)
         log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))
@@ -159,7 +144,7 @@ class ArrivalBelief(Searched):
             self._here,
             self.model.reach,
             self.model.bias,
-            (self._length, self._direction),
+            self._fields.framed,
             (bearing, log_length, precision),
         )
 
@@ -209,20 +194,29 @@ class ArrivalBelief(Searched):
             succeed there: the square with the greatest probability of success is returned. By
             default the likeliest square of the source.
         """
-        flat = self.log_belief.reshape(len(cost), -1)
-        none = active & ~np.isfinite(flat.max(1))
-        if none.any():
-            self.searched[none] = False
+        best = np.zeros(len(cost), dtype=np.int64)
+        rows = np.flatnonzero(active)
+        best[rows], there = self._best(rows, offsets)
+        if not there.all():
+            again = rows[~there]
+            self.searched[again] = False
+            none = np.zeros_like(active)
+            none[again] = True
             self.score(cost, none)
-        best = flat.argmax(1)
-        if offsets is not None:
-            rows = np.flatnonzero(active)
-            best[rows] = (
-                _most_around(self.log_belief[rows], offsets)
-                .reshape(len(rows), flat.shape[1])
-                .argmax(1)
-            )
+            best[again], _ = self._best(again, offsets)
         return np.stack((best % cost.shape[1], best // cost.shape[1]), 1)
+
+    def _best(
+        self, rows: NDArray[np.int64], offsets: NDArray[np.int64] | None
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the flat index of the best square, and whether there is any, (R,) each."""
+        best, there = np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.bool_)
+        for part in _parts(len(rows)):
+            own = self.log_belief[rows[part]]
+            flat = own.reshape(len(own), -1)
+            there[part] = np.isfinite(flat.max(1))
+            best[part] = flat.argmax(1) if offsets is None else _best_around(_likely(own), offsets)
+        return best, there
 
     def heard_around(self) -> NDArray[np.bool_]:
         """Return whether each agent has listened with all four headings where it is, (N,)."""
@@ -232,7 +226,12 @@ class ArrivalBelief(Searched):
         """Return whether each agent has heard anything, (N,)."""
         return np.asarray((self._weight > _LEAST_WEIGHT).any(1))
 
-    def near(self, position: NDArray[np.int64], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
+    def near(
+        self,
+        position: NDArray[np.int64],
+        offsets: NDArray[np.int64],
+        active: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.float64]:
         """Return the probability that the source is at some offsets from each agent, (N,).
 
         Parameters
@@ -241,31 +240,52 @@ class ArrivalBelief(Searched):
             Column and row of the agents.
         offsets : (k, 2) int64
             Offsets in columns and rows.
+        active : (N,) bool, optional
+            Agents to answer for, all by default; 0 for the others.
         """
-        flat = self.log_belief.reshape(len(position), -1)
-        top = flat.max(1)
-        belief = np.exp(flat - np.where(np.isfinite(top), top, 0.0)[:, None])
+        found = np.zeros(len(position), dtype=np.float64)
+        rows = np.arange(len(position)) if active is None else np.flatnonzero(active)
         size = self.log_belief.shape[1]
         squares = np.clip(position[:, None] + offsets, 0, size - 1)
-        own = np.take_along_axis(belief, squares[..., 1] * size + squares[..., 0], 1)
-        found: NDArray[np.float64] = own.sum(1) / np.maximum(belief.sum(1), 1e-30)
+        index = squares[..., 1] * size + squares[..., 0]
+        for part in _parts(len(rows)):
+            own = rows[part]
+            belief = _likely(self.log_belief[own]).reshape(len(own), -1)
+            nearby = np.take_along_axis(belief, index[own], 1).sum(1)
+            found[own] = nearby / np.maximum(belief.sum(1), 1e-30)
         return found
 
 
-def _most_around(
-    log_belief: NDArray[np.float32], offsets: NDArray[np.int64]
-) -> NDArray[np.float32]:
-    """Return the probability around each square, up to a factor; 0 where the source cannot be."""
+def _parts(count: int) -> list[slice]:
+    """Return slices of `_TOGETHER` of so many rows."""
+    return [slice(i, i + _TOGETHER) for i in range(0, count, _TOGETHER)]
+
+
+def _likely(log_belief: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the probability of each square up to a factor of each agent, (R, M, M)."""
     top = log_belief.max((1, 2), keepdims=True)
-    belief = np.exp(log_belief - np.where(np.isfinite(top), top, 0))
-    most = int(np.abs(offsets).max(initial=0))
-    wide = np.pad(belief, ((0, 0), (most, most), (most, most)))
-    size = log_belief.shape[1]
-    total = np.zeros_like(belief)
-    for column, row in offsets:
-        rows, columns = (slice(most + off, most + off + size) for off in (row, column))
-        total += wide[:, rows, columns]
-    return np.where(belief > 0, total, np.float32(0))
+    return np.exp(log_belief - np.where(np.isfinite(top), top, np.float32(0)))
+
+
+@numba.njit(cache=True, parallel=True)
+def _best_around(belief, offsets):  # type: ignore[no-untyped-def]
+    """Return the square with the greatest sum at some offsets, of those above 0: (R,) int64."""
+    size = belief.shape[1]
+    best = np.zeros(len(belief), dtype=np.int64)
+    for n in numba.prange(len(belief)):
+        most = np.float32(0.0)
+        total = np.empty(size, dtype=np.float32)
+        for y in range(size):
+            total[:] = 0.0
+            for i in range(len(offsets)):
+                right, up = offsets[i, 0], offsets[i, 1]
+                if 0 <= y + up < size:
+                    for x in range(max(0, -right), min(size, size - right)):
+                        total[x] += belief[n, y + up, x + right]
+            for x in range(size):
+                if total[x] > most and belief[n, y, x] > 0:
+                    most, best[n] = total[x], y * size + x
+    return best
 
 
 @numba.njit(cache=True, parallel=True)
@@ -275,35 +295,64 @@ def _score(  # type: ignore[no-untyped-def]
     length, direction = fields
     bearing, log_length, precision = terms
     size, slots = cost.shape[1], kept.shape[1]
-    logs = np.empty(_LENGTHS, dtype=np.float32)
+    # lengths of the fields, and one more for what was not reached
+    lengths = min(reach * STRAIGHT + LONGEST + 2, _LENGTHS)
+    logs = np.empty(lengths, dtype=np.float32)
     logs[0] = math.log(0.5)  # of the square where the agent is
-    for i in range(1, len(logs)):
+    for i in range(1, lengths - 1):
         logs[i] = math.log(i * SQUARES)
+    logs[lengths - 1] = math.log((_LENGTHS - 1) * SQUARES)
     for n in numba.prange(len(cost)):
         if not active[n]:
             continue
         log_belief[n, :, :] = -np.inf
+        weight, first_of, second_of = _tables(logs, kept[n], log_length[n], precision[n], bias)
+        total, first, second = (
+            np.empty(size, dtype=np.float32),
+            np.empty(size, dtype=np.float32),
+            np.empty(size, dtype=np.float32),
+        )
         x0, y0 = position[n, 0], position[n, 1]
+        left, right = max(x0 - reach, 0), min(x0 + reach + 1, size)
         for y in range(max(y0 - reach, 0), min(y0 + reach + 1, size)):
-            for x in range(max(x0 - reach, 0), min(x0 + reach + 1, size)):
+            total[:], first[:], second[:] = 0.0, 0.0, 0.0
+            for k in range(slots):
+                if not kept[n, k]:
+                    continue
+                for x in range(left, right):
+                    units = min(int(length[n, k, y + 1, x + 1]), lengths - 1)
+                    first[x] += first_of[k, units]
+                    second[x] += second_of[k, units]
+                    total[x] += bearing[n, k, direction[n, k, y + 1, x + 1]]
+            for x in range(left, right):
                 if cost[n, y, x] == np.inf or searched[n, y, x]:
                     continue
-                total = np.float32(0.0)
-                # sums over the places of 1, error and squared error, weighted by precision
-                weight = first = second = np.float32(0.0)
-                for k in range(slots):
-                    if kept[n, k]:
-                        units = min(int(length[n, k, y, x]), _LENGTHS - 1)
-                        off = logs[units] - log_length[n, k]
-                        most = (
-                            _OUTLIER / math.sqrt(max(precision[n, k], _LEAST_PRECISION)) + 2 * bias
-                        )
-                        off = np.float32(min(max(off, -most), most))
-                        weight += precision[n, k]
-                        first += precision[n, k] * off
-                        second += precision[n, k] * off * off
-                        total += bearing[n, k, direction[n, k, y, x]]
+                error = second[x]
                 # Gaussian errors with a shared part, which is integrated out
                 if bias > 0:
-                    second -= first * first / (weight + np.float32(1.0 / (bias * bias)))
-                log_belief[n, y, x] = total - np.float32(0.5) * second
+                    error -= first[x] * first[x] / (weight + np.float32(1.0 / (bias * bias)))
+                log_belief[n, y, x] = total[x] - np.float32(0.5) * error
+
+
+@numba.njit(cache=True)
+def _tables(logs, kept, log_length, precision, bias):  # type: ignore[no-untyped-def]
+    """Return the sum of the precisions, and for each place and length error and squared error.
+
+    The errors are weighted by the precision of the place.
+    """
+    weight = np.float32(0.0)
+    first, second = (
+        np.empty((len(kept), len(logs)), dtype=np.float32),
+        np.empty((len(kept), len(logs)), dtype=np.float32),
+    )
+    for k in range(len(kept)):
+        if not kept[k]:
+            continue
+        weight += precision[k]
+        most = _OUTLIER / math.sqrt(max(precision[k], _LEAST_PRECISION)) + 2 * bias
+        for units in range(len(logs)):
+            off = logs[units] - log_length[k]
+            off = np.float32(min(max(off, -most), most))
+            first[k, units] = precision[k] * off
+            second[k, units] = precision[k] * off * off
+    return weight, first, second
