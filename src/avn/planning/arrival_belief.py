@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.actions import HEADINGS
-from avn.planning.field_search import LONGEST, STRAIGHT
+from avn.planning.posterior import best_around, likely, parts, score
 from avn.planning.searched import Searched
 from avn.planning.settings import ArrivalModel
-from avn.planning.sound_fields import SQUARES, SoundFields
+from avn.planning.sound_fields import SoundFields
 
 # Weight below which evidence is left out.
 _LEAST_WEIGHT = 1e-3
-_LEAST_PRECISION = 1e-6
-# Length in units of `sound_fields` up to which logarithms are tabulated.
-_LENGTHS = 4096
-# Agents whose posteriors are taken together where a step needs copies of them.
-_TOGETHER = 16
-# Standard deviations at which the error of a length is cut off, so that no outlier decides.
-_OUTLIER = 4.0
 
 
 class ArrivalBelief(Searched):
@@ -135,7 +126,7 @@ class ArrivalBelief(Searched):
         log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))
         bearing[row, slot] = self._bearing_terms(row, slot)
         log_length[row, slot], precision[row, slot] = self._length_terms(row, slot)
-        _score(
+        score(
             self.log_belief,
             cost,
             self.searched,
@@ -152,8 +143,8 @@ class ArrivalBelief(Searched):
         """Return the weighted log-probability of each direction, and of none, (R, B + 1)."""
         count, model = self._count[row, slot], self.model
         mean = self._bearing[row, slot] / np.maximum(count, 1)[..., None]
-        likely = np.log((1 - model.blur) * np.exp(mean) + model.blur / self.bins)
-        summed = (likely * (count > 0)[..., None]).sum(1)
+        terms = np.log((1 - model.blur) * np.exp(mean) + model.blur / self.bins)
+        summed = (terms * (count > 0)[..., None]).sum(1)
         terms = model.bearing_weight * self._weight[row, slot][:, None] * summed
         # beyond the reach is less likely than the least likely direction
         return np.concatenate((terms, terms.min(1, keepdims=True) - 5), 1)
@@ -211,11 +202,11 @@ class ArrivalBelief(Searched):
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """Return the flat index of the best square, and whether there is any, (R,) each."""
         best, there = np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.bool_)
-        for part in _parts(len(rows)):
+        for part in parts(len(rows)):
             own = self.log_belief[rows[part]]
             flat = own.reshape(len(own), -1)
             there[part] = np.isfinite(flat.max(1))
-            best[part] = flat.argmax(1) if offsets is None else _best_around(_likely(own), offsets)
+            best[part] = flat.argmax(1) if offsets is None else best_around(likely(own), offsets)
         return best, there
 
     def heard_around(self) -> NDArray[np.bool_]:
@@ -248,111 +239,9 @@ class ArrivalBelief(Searched):
         size = self.log_belief.shape[1]
         squares = np.clip(position[:, None] + offsets, 0, size - 1)
         index = squares[..., 1] * size + squares[..., 0]
-        for part in _parts(len(rows)):
+        for part in parts(len(rows)):
             own = rows[part]
-            belief = _likely(self.log_belief[own]).reshape(len(own), -1)
+            belief = likely(self.log_belief[own]).reshape(len(own), -1)
             nearby = np.take_along_axis(belief, index[own], 1).sum(1)
             found[own] = nearby / np.maximum(belief.sum(1), 1e-30)
         return found
-
-
-def _parts(count: int) -> list[slice]:
-    """Return slices of `_TOGETHER` of so many rows."""
-    return [slice(i, i + _TOGETHER) for i in range(0, count, _TOGETHER)]
-
-
-def _likely(log_belief: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the probability of each square up to a factor of each agent, (R, M, M)."""
-    top = log_belief.max((1, 2), keepdims=True)
-    return np.exp(log_belief - np.where(np.isfinite(top), top, np.float32(0)))
-
-
-@numba.njit(cache=True, parallel=True)
-def _best_around(belief, offsets):  # type: ignore[no-untyped-def]
-    """Return the square with the greatest sum at some offsets, of those above 0: (R,) int64."""
-    size = belief.shape[1]
-    best = np.zeros(len(belief), dtype=np.int64)
-    for n in numba.prange(len(belief)):
-        most = np.float32(0.0)
-        total = np.empty(size, dtype=np.float32)
-        for y in range(size):
-            total[:] = 0.0
-            for i in range(len(offsets)):
-                right, up = offsets[i, 0], offsets[i, 1]
-                if 0 <= y + up < size:
-                    for x in range(max(0, -right), min(size, size - right)):
-                        total[x] += belief[n, y + up, x + right]
-            for x in range(size):
-                if total[x] > most and belief[n, y, x] > 0:
-                    most, best[n] = total[x], y * size + x
-    return best
-
-
-@numba.njit(cache=True, parallel=True)
-def _score(  # type: ignore[no-untyped-def]
-    log_belief, cost, searched, active, kept, position, reach, bias, fields, terms
-):
-    length, direction = fields
-    bearing, log_length, precision = terms
-    size, slots = cost.shape[1], kept.shape[1]
-    # lengths of the fields, and one more for what was not reached
-    lengths = min(reach * STRAIGHT + LONGEST + 2, _LENGTHS)
-    logs = np.empty(lengths, dtype=np.float32)
-    logs[0] = math.log(0.5)  # of the square where the agent is
-    for i in range(1, lengths - 1):
-        logs[i] = math.log(i * SQUARES)
-    logs[lengths - 1] = math.log((_LENGTHS - 1) * SQUARES)
-    for n in numba.prange(len(cost)):
-        if not active[n]:
-            continue
-        log_belief[n, :, :] = -np.inf
-        weight, first_of, second_of = _tables(logs, kept[n], log_length[n], precision[n], bias)
-        total, first, second = (
-            np.empty(size, dtype=np.float32),
-            np.empty(size, dtype=np.float32),
-            np.empty(size, dtype=np.float32),
-        )
-        x0, y0 = position[n, 0], position[n, 1]
-        left, right = max(x0 - reach, 0), min(x0 + reach + 1, size)
-        for y in range(max(y0 - reach, 0), min(y0 + reach + 1, size)):
-            total[:], first[:], second[:] = 0.0, 0.0, 0.0
-            for k in range(slots):
-                if not kept[n, k]:
-                    continue
-                for x in range(left, right):
-                    units = min(int(length[n, k, y + 1, x + 1]), lengths - 1)
-                    first[x] += first_of[k, units]
-                    second[x] += second_of[k, units]
-                    total[x] += bearing[n, k, direction[n, k, y + 1, x + 1]]
-            for x in range(left, right):
-                if cost[n, y, x] == np.inf or searched[n, y, x]:
-                    continue
-                error = second[x]
-                # Gaussian errors with a shared part, which is integrated out
-                if bias > 0:
-                    error -= first[x] * first[x] / (weight + np.float32(1.0 / (bias * bias)))
-                log_belief[n, y, x] = total[x] - np.float32(0.5) * error
-
-
-@numba.njit(cache=True)
-def _tables(logs, kept, log_length, precision, bias):  # type: ignore[no-untyped-def]
-    """Return the sum of the precisions, and for each place and length error and squared error.
-
-    The errors are weighted by the precision of the place.
-    """
-    weight = np.float32(0.0)
-    first, second = (
-        np.empty((len(kept), len(logs)), dtype=np.float32),
-        np.empty((len(kept), len(logs)), dtype=np.float32),
-    )
-    for k in range(len(kept)):
-        if not kept[k]:
-            continue
-        weight += precision[k]
-        most = _OUTLIER / math.sqrt(max(precision[k], _LEAST_PRECISION)) + 2 * bias
-        for units in range(len(logs)):
-            off = logs[units] - log_length[k]
-            off = np.float32(min(max(off, -most), most))
-            first[k, units] = precision[k] * off
-            second[k, units] = precision[k] * off * off
-    return weight, first, second

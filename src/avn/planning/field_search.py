@@ -1,8 +1,8 @@
 """Search behind `sound_fields`: fields are repaired where the map has changed.
 
-A field is a shortest-path forest in three arrays over the flat squares of a map with a margin of one
-blocked square: length, direction, and a state that holds where the path comes from and what is known
-of the line of sight. A change of the map invalidates the squares whose paths pass the changed
+A field is a shortest-path forest in three arrays over the flat squares of a map with a margin of
+one blocked square: length, direction, and a state that holds where the path comes from and what is
+known of the line of sight. A change of the map invalidates the squares whose paths pass the changed
 squares; they are searched again from the others, as in dynamic shortest-path forests (Ramalingam
 and Reps, "An incremental algorithm for a generalization of the shortest-path problem", Journal of
 Algorithms 21, 1996). Of equally long paths, the repaired field has those of a complete search,
@@ -14,20 +14,26 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from avn.planning.sight import CLEAR_SIGHT, DARK, SIGHT, UNKNOWN, is_clear, shade
+from avn.planning.field_state import (
+    BENT,
+    CHANGED,
+    CLEAR_SIGHT,
+    DARK,
+    FROM,
+    INVALID,
+    KNOWN,
+    LONGEST,
+    NOWHERE,
+    RESTING,
+    SAME,
+    SIGHT,
+    STRAIGHT,
+    UNKNOWN,
+    UNREACHED,
+    WAITING,
+)
+from avn.planning.sight import is_clear, shade
 
-# Units of length on a free square, straight and diagonal; their ratio is sqrt(2) within 1 %.
-STRAIGHT, DIAGONAL = 5, 7
-# Length of what was not reached.
-UNREACHED = 32767
-# Longest step in units.
-LONGEST = 31
-# Parts of a state: the neighbour from which the path comes, 0 to 7 in the order of rows, or none;
-# and whether the path has left the line of sight. The rest is `SIGHT`.
-_FROM, NOWHERE, _BENT = 15, 8, 16
-# Marks of squares: not looked at; waiting, with a known or an unknown predecessor; done, with or
-# without a change; and invalidated.
-_RESTING, _KNOWN, _WAITING, _CHANGED, _SAME, _INVALID = 0, 1, 2, 3, 4, 5
 # Columns and rows from a square to its neighbours.
 _RIGHT = np.array([-1, 0, 1, -1, 1, -1, 0, 1])
 _UP = np.array([-1, -1, -1, 0, 0, 1, 1, 1])
@@ -57,6 +63,7 @@ def new_workspace(squares, reach):  # type: ignore[no-untyped-def]
         np.empty((10 * squares, 2), dtype=np.int32),  # entries: square, and next entry
         np.zeros(squares, dtype=np.uint8),  # marks
         np.empty(squares, dtype=np.int32),  # invalidated squares
+        (np.arange(squares) // int(np.sqrt(squares))).astype(np.int16),  # row of each square
     )
 
 
@@ -70,17 +77,17 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
     each offset from `start`, (2 M - 1, 2 M - 1).
     """
     length, direction, state = field
-    heads, entries, mark, invalid = workspace
+    heads, entries, mark, invalid, _ = workspace
     width = int(np.sqrt(len(length)))
-    mark[:] = _RESTING
+    mark[:] = RESTING
     count = _invalidate(field, steps, start, bins, changes, mark, invalid, width)
     used = 0
     if count < 0:
         length[:], direction[:] = UNREACHED, bins
         for square in range(len(state)):
             state[square] = (state[square] & SIGHT) | NOWHERE
-        mark[:] = _RESTING
-        length[start], mark[start] = 0, _KNOWN
+        mark[:] = RESTING
+        length[start], mark[start] = 0, KNOWN
         entries[0, 0], entries[0, 1], heads[0] = start, -1, 0
         used = 1
     for i in range(count):
@@ -97,7 +104,7 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
 @numba.njit(cache=True)
 def _invalidate(field, steps, start, bins, changes, mark, invalid, width):  # type: ignore[no-untyped-def]
     """Invalidate what changed, and all paths through it; return the number, or -1 if many."""
-    count, most = 0, len(invalid) // 3
+    count, most = 0, 2 * len(invalid) // 3
     _, _, state = field
     for change in changes:
         square = change >> 1
@@ -107,7 +114,7 @@ def _invalidate(field, steps, start, bins, changes, mark, invalid, width):  # ty
                 there = square + _UP[k] * width + _RIGHT[k]
                 if steps[0, there] == 0:
                     continue
-                way = state[there] & _FROM
+                way = state[there] & FROM
                 # a freed square opens diagonal steps around it, a blocked one may close them
                 if steps[0, square] > 0 or (way < NOWHERE and _shut(steps, there, way, width)):
                     count = _drop(there, field, start, bins, mark, invalid, count)
@@ -117,7 +124,7 @@ def _invalidate(field, steps, start, bins, changes, mark, invalid, width):  # ty
     while i < count:
         for k in range(8):
             there = invalid[i] + _UP[k] * width + _RIGHT[k]
-            if state[there] & _FROM == k:
+            if state[there] & FROM == k:
                 count = _drop(there, field, start, bins, mark, invalid, count)
         if count > most:
             return -1
@@ -125,18 +132,18 @@ def _invalidate(field, steps, start, bins, changes, mark, invalid, width):  # ty
     return count
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, inline="always")
 def _drop(square, field, start, bins, mark, invalid, count):  # type: ignore[no-untyped-def]
     length, direction, state = field
-    if square == start or mark[square] == _INVALID:
+    if square == start or mark[square] == INVALID:
         return count
-    mark[square], length[square], direction[square] = _INVALID, UNREACHED, bins
+    mark[square], length[square], direction[square] = INVALID, UNREACHED, bins
     state[square] = (state[square] & SIGHT) | NOWHERE
     invalid[count] = square
     return count + 1
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, inline="always")
 def _shut(steps, square, way, width):  # type: ignore[no-untyped-def]
     """Return whether a diagonal step to a square passes between two blocked ones."""
     right, up = _RIGHT[way], _UP[way] * width
@@ -145,7 +152,7 @@ def _shut(steps, square, way, width):  # type: ignore[no-untyped-def]
     return steps[0, square - right] == 0 and steps[0, square - up] == 0
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, inline="always")
 def _seed(square, field, steps, reach, mark, heads, entries, used, width):  # type: ignore[no-untyped-def]
     """Put an invalidated square into the queue, with the least length from valid neighbours."""
     length = field[0]
@@ -154,14 +161,14 @@ def _seed(square, field, steps, reach, mark, heads, entries, used, width):  # ty
     least = UNREACHED
     for k in range(8):
         before = square - _UP[k] * width - _RIGHT[k]
-        if mark[before] != _RESTING or length[before] > reach * STRAIGHT:
+        if mark[before] != RESTING or length[before] > reach * STRAIGHT:
             continue
         total = length[before] + steps[int(_RIGHT[k] != 0 and _UP[k] != 0), square]
         if total < least and not _shut(steps, square, k, width):
             least = total
     if least == UNREACHED:
         return used
-    length[square], mark[square] = least, _WAITING
+    length[square], mark[square] = least, WAITING
     entries[used, 0], entries[used, 1], heads[least] = square, heads[least], used
     return used + 1
 
@@ -169,69 +176,91 @@ def _seed(square, field, steps, reach, mark, heads, entries, used, width):  # ty
 @numba.njit(cache=True)
 def _search(field, steps, start, reach, bins, aims, workspace, used, width):  # type: ignore[no-untyped-def]
     length, direction, state = field
-    heads, entries, mark, _ = workspace
-    most, centre = reach * STRAIGHT, len(aims) // 2
-    x0, y0 = start % width, start // width
+    heads, entries, mark, _, rows = workspace
+    shift = _UP * width + _RIGHT
     for now in range(len(heads)):
         while heads[now] >= 0:
             square = entries[heads[now], 0]
             heads[now] = entries[heads[now], 1]
-            waiting = mark[square]
-            if length[square] != now or (waiting != _KNOWN and waiting != _WAITING):
+            if length[square] != now or (mark[square] != KNOWN and mark[square] != WAITING):
                 continue
-            mark[square] = _CHANGED
-            old = state[square]
-            way = old & _FROM
-            if square != start:
-                if waiting == _WAITING:
-                    way = _way(field, steps, square, now, most, width)
-                before = square - _UP[way] * width - _RIGHT[way]
-                sight = old & SIGHT
-                if now > most:
-                    state[square] = sight | way
-                    direction[square] = bins
-                    continue
-                bent = state[before] & _BENT
-                if bent == 0 and sight == UNKNOWN:
-                    sight = CLEAR_SIGHT if is_clear(steps, start, square, width) else DARK
-                if bent != 0 or sight == DARK:
-                    aim, bent = direction[before], _BENT
-                else:
-                    aim = aims[square // width - y0 + centre, square % width - x0 + centre]
-                same = old & (_FROM | _BENT) == way | bent and direction[square] == aim
-                state[square], direction[square] = sight | bent | way, aim
-                if waiting == _WAITING and same and mark[before] != _CHANGED:
-                    mark[square] = _SAME
-                    continue
+            if square == start:
+                mark[square] = CHANGED
+            elif not _settle(
+                length,
+                direction,
+                state,
+                steps,
+                start,
+                square,
+                now,
+                reach,
+                bins,
+                aims,
+                mark,
+                rows,
+                width,
+            ):
+                continue
+            way = state[square] & FROM
             for i in range(8):
                 k = _ONWARD[way, i]
                 if k < 0:
                     break
-                right, up = _RIGHT[k], _UP[k] * width
-                there = square + right + up
-                step = steps[int(right != 0 and up != 0), there]
+                there = square + shift[k]
+                diagonal = _RIGHT[k] * _UP[k] != 0
+                step = steps[int(diagonal), there]
                 total = now + step
                 if step == 0 or total > length[there]:
                     continue
-                if right != 0 and up != 0:
-                    if steps[0, square + right] == 0 and steps[0, square + up] == 0:
-                        continue
-                if total < length[there]:
-                    length[there], mark[there] = total, _KNOWN
-                    state[there] = (state[there] & SIGHT) | k
-                elif mark[there] == _RESTING:
-                    mark[there] = _WAITING
-                else:
-                    mark[there] = _WAITING
+                beside = there - _RIGHT[k]
+                if diagonal and steps[0, square + _RIGHT[k]] == 0 and steps[0, beside] == 0:
                     continue
+                if total < length[there]:
+                    length[there], mark[there] = total, KNOWN
+                    state[there] = (state[there] & SIGHT) | k
+                else:
+                    # as long as the path that is there: which one counts is known later
+                    waiting, mark[there] = mark[there], WAITING
+                    if waiting != RESTING:
+                        continue
                 entries[used, 0], entries[used, 1], heads[total] = there, heads[total], used
                 used += 1
 
 
+@numba.njit(cache=True, inline="always")
+def _settle(  # type: ignore[no-untyped-def]
+    length, direction, state, steps, start, square, now, reach, bins, aims, mark, rows, width
+):
+    """Set state and direction of a square of known length; return whether paths may change."""
+    waiting, old = mark[square], state[square]
+    way, sight = old & FROM, old & SIGHT
+    mark[square] = CHANGED
+    if waiting == WAITING:
+        way = _way(length, state, steps, square, now, reach * STRAIGHT, width)
+    if now > reach * STRAIGHT:
+        state[square], direction[square] = sight | way, bins
+        return False
+    before = square - _UP[way] * width - _RIGHT[way]
+    bent = state[before] & BENT
+    if bent == 0 and sight == UNKNOWN:
+        sight = CLEAR_SIGHT if is_clear(steps, start, square, width) else DARK
+    if bent != 0 or sight == DARK:
+        aim, bent = direction[before], BENT
+    else:
+        y, y0, centre = rows[square], rows[start], len(aims) // 2
+        aim = aims[y - y0 + centre, square - start - (y - y0) * width + centre]
+    same = old & (FROM | BENT) == way | bent and direction[square] == aim
+    state[square], direction[square] = sight | bent | way, aim
+    if waiting == WAITING and same and mark[before] != CHANGED:
+        mark[square] = SAME
+        return False
+    return True
+
+
 @numba.njit(cache=True)
-def _way(field, steps, square, now, most, width):  # type: ignore[no-untyped-def]
+def _way(length, state, steps, square, now, most, width):  # type: ignore[no-untyped-def]
     """Return the step by which the path arrives at a square: the first found by a whole search."""
-    length, _, state = field
     best, found = -1, NOWHERE
     for k in range(8):
         before = square - _UP[k] * width - _RIGHT[k]
@@ -259,7 +288,7 @@ def _earlier(length, state, one, other, width):  # type: ignore[no-untyped-def]
     """
     flipped = False
     while True:
-        a, b = state[one] & _FROM, state[other] & _FROM
+        a, b = state[one] & FROM, state[other] & FROM
         one -= _UP[a] * width + _RIGHT[a]
         other -= _UP[b] * width + _RIGHT[b]
         if one == other:

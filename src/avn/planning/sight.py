@@ -1,8 +1,8 @@
 """Lines of sight on maps of squares: what a blocked square hides.
 
-A line between the centres of two squares is that of Bresenham ("Algorithm for computer control of a
-digital plotter", IBM Systems Journal 4, 1965). At the i-th of a steps along its longer axis it is at
-the step i b / a along the other one, rounded, halves down. So square (i, j) lies on the line to
+A line between the centres of two squares is that of Bresenham ("Algorithm for computer control of
+a digital plotter", IBM Systems Journal 4, 1965). At the i-th of a steps along its longer axis it is
+at the step i b / a along the other one, rounded, halves down. So square (i, j) lies on the line to
 (a, b) if (2 j - 1) / (2 i) < b / a <= (2 j + 1) / (2 i), with i < a.
 """
 
@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numba
 
-# Part of a state of `field_search`: what is known of the line of sight.
-SIGHT, CLEAR_SIGHT, DARK, UNKNOWN = 96, 0, 32, 64
-_REST, _BENT, _RESTING, _WAITING = 255 - SIGHT, 16, 0, 2
+from avn.planning.field_state import BENT, DARK, RESTING, SIGHT, STRAIGHT, UNKNOWN, WAITING
+
+_REST = 255 - SIGHT
 
 
 @numba.njit(cache=True)
@@ -77,15 +77,15 @@ def _shade_one(there, blocked, reach, length, state, mark, heads, entries, used)
         if sight == DARK:
             return used
         state[there] = (own & _REST) | DARK
-        if own & _BENT:
+        if own & BENT:
             return used
     else:
         if sight != DARK:
             return used
         state[there] = (own & _REST) | UNKNOWN
     now = length[there]
-    if mark[there] == _RESTING and now <= 5 * reach:
-        mark[there] = _WAITING
+    if mark[there] == RESTING and now <= reach * STRAIGHT:
+        mark[there] = WAITING
         entries[used, 0], entries[used, 1], heads[now] = there, heads[now], used
         used += 1
     return used

@@ -18,16 +18,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from avn.planning.field_search import (
-    DIAGONAL,
-    LONGEST,
-    NOWHERE,
-    STRAIGHT,
-    UNREACHED,
-    new_workspace,
-    repair,
-)
-from avn.planning.sight import UNKNOWN
+from avn.planning.field_search import new_workspace, repair
+from avn.planning.field_state import DIAGONAL, LONGEST, NOWHERE, STRAIGHT, UNKNOWN, UNREACHED
+
+__all__ = ["DIAGONAL", "SQUARES", "STRAIGHT", "UNREACHED", "SoundFields", "sound_fields"]
 
 # Factor from units of length to squares.
 SQUARES = 1.0 / STRAIGHT
