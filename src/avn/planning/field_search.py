@@ -23,11 +23,13 @@ from avn.planning.field_state import (
     INVALID,
     KNOWN,
     LONGEST,
+    LOOKING,
     NOWHERE,
     RESTING,
     SAME,
     SIGHT,
     STRAIGHT,
+    TURNED,
     UNKNOWN,
     UNREACHED,
     WAITING,
@@ -62,7 +64,7 @@ def new_workspace(squares, reach):  # type: ignore[no-untyped-def]
         np.full(levels, -1, dtype=np.int32),  # newest entry of the queue at each length
         np.empty((10 * squares, 2), dtype=np.int32),  # entries: square, and next entry
         np.zeros(squares, dtype=np.uint8),  # marks
-        np.empty(squares, dtype=np.int32),  # invalidated squares
+        np.empty(2 * squares, dtype=np.int32),  # squares: invalidated, then of another sight
         (np.arange(squares) // int(np.sqrt(squares))).astype(np.int16),  # row of each square
     )
 
@@ -77,10 +79,10 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
     each offset from `start`, (2 M - 1, 2 M - 1).
     """
     length, direction, state = field
-    heads, entries, mark, invalid, _ = workspace
-    width = int(np.sqrt(len(length)))
+    heads, entries, mark, listed, rows = workspace
+    width, most = int(np.sqrt(len(length))), reach * STRAIGHT
     mark[:] = RESTING
-    count = _invalidate(field, steps, start, bins, changes, mark, invalid, width)
+    count = _invalidate(length, direction, state, steps, start, bins, changes, mark, listed, width)
     used = 0
     if count < 0:
         length[:], direction[:] = UNREACHED, bins
@@ -90,60 +92,62 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
         length[start], mark[start] = 0, KNOWN
         entries[0, 0], entries[0, 1], heads[0] = start, -1, 0
         used = 1
-    for i in range(count):
-        used = _seed(invalid[i], field, steps, reach, mark, heads, entries, used, width)
-    for change in changes:
-        if change & 1:
-            blocked = steps[0, change >> 1] == 0
-            used = shade(
-                change >> 1, start, blocked, reach, width, length, state, mark, heads, entries, used
-            )
-    _search(field, steps, start, reach, bins, aims, workspace, used, width)
+    else:
+        used = _seed(length, steps, most, mark, listed[:count], heads, entries, width)
+    count = 0
+    for blocked in (False, True):
+        count = shade(steps, start, reach, width, state, changes, blocked, listed, count)
+    for square in listed[:count]:
+        hidden = state[square] & (BENT | SIGHT) == BENT | DARK
+        if not hidden and mark[square] == RESTING and length[square] <= most:
+            mark[square], now = LOOKING, length[square]
+            entries[used, 0], entries[used, 1], heads[now] = square, heads[now], used
+            used += 1
+    _search(
+        length, direction, state, steps, start, most, bins, aims, mark, heads, entries, used, rows
+    )
 
 
 @numba.njit(cache=True)
-def _invalidate(field, steps, start, bins, changes, mark, invalid, width):  # type: ignore[no-untyped-def]
+def _invalidate(  # type: ignore[no-untyped-def]
+    length, direction, state, steps, start, bins, changes, mark, listed, width
+):
     """Invalidate what changed, and all paths through it; return the number, or -1 if many."""
-    count, most = 0, 2 * len(invalid) // 3
-    _, _, state = field
+    count, most = 0, 2 * len(length) // 3
     for change in changes:
         square = change >> 1
-        count = _drop(square, field, start, bins, mark, invalid, count)
+        if square != start and mark[square] != INVALID:
+            mark[square], listed[count] = INVALID, square
+            count += 1
         if change & 1:
             for k in (1, 3, 4, 6):
                 there = square + _UP[k] * width + _RIGHT[k]
-                if steps[0, there] == 0:
+                if steps[0, there] == 0 or there == start or mark[there] == INVALID:
                     continue
                 way = state[there] & FROM
                 # a freed square opens diagonal steps around it, a blocked one may close them
                 if steps[0, square] > 0 or (way < NOWHERE and _shut(steps, there, way, width)):
-                    count = _drop(there, field, start, bins, mark, invalid, count)
+                    mark[there], listed[count] = INVALID, there
+                    count += 1
         if count > most:
             return -1
     i = 0
     while i < count:
+        square = listed[i]
+        length[square], direction[square] = UNREACHED, bins
+        state[square] = (state[square] & SIGHT) | NOWHERE
         for k in range(8):
-            there = invalid[i] + _UP[k] * width + _RIGHT[k]
-            if state[there] & FROM == k:
-                count = _drop(there, field, start, bins, mark, invalid, count)
+            there = square + _UP[k] * width + _RIGHT[k]
+            if state[there] & FROM == k and mark[there] != INVALID:
+                mark[there], listed[count] = INVALID, there
+                count += 1
         if count > most:
             return -1
         i += 1
     return count
 
 
-@numba.njit(cache=True, inline="always")
-def _drop(square, field, start, bins, mark, invalid, count):  # type: ignore[no-untyped-def]
-    length, direction, state = field
-    if square == start or mark[square] == INVALID:
-        return count
-    mark[square], length[square], direction[square] = INVALID, UNREACHED, bins
-    state[square] = (state[square] & SIGHT) | NOWHERE
-    invalid[count] = square
-    return count + 1
-
-
-@numba.njit(cache=True, inline="always")
+@numba.njit(cache=True)
 def _shut(steps, square, way, width):  # type: ignore[no-untyped-def]
     """Return whether a diagonal step to a square passes between two blocked ones."""
     right, up = _RIGHT[way], _UP[way] * width
@@ -152,110 +156,122 @@ def _shut(steps, square, way, width):  # type: ignore[no-untyped-def]
     return steps[0, square - right] == 0 and steps[0, square - up] == 0
 
 
-@numba.njit(cache=True, inline="always")
-def _seed(square, field, steps, reach, mark, heads, entries, used, width):  # type: ignore[no-untyped-def]
-    """Put an invalidated square into the queue, with the least length from valid neighbours."""
-    length = field[0]
-    if steps[0, square] == 0:
-        return used
-    least = UNREACHED
-    for k in range(8):
-        before = square - _UP[k] * width - _RIGHT[k]
-        if mark[before] != RESTING or length[before] > reach * STRAIGHT:
+@numba.njit(cache=True)
+def _seed(length, steps, most, mark, invalid, heads, entries, width):  # type: ignore[no-untyped-def]
+    """Put invalidated squares into the queue, with the least length from a valid neighbour."""
+    used = 0
+    for square in invalid:
+        if steps[0, square] == 0:
             continue
-        total = length[before] + steps[int(_RIGHT[k] != 0 and _UP[k] != 0), square]
-        if total < least and not _shut(steps, square, k, width):
-            least = total
-    if least == UNREACHED:
-        return used
-    length[square], mark[square] = least, WAITING
-    entries[used, 0], entries[used, 1], heads[least] = square, heads[least], used
-    return used + 1
+        least = UNREACHED
+        for k in range(8):
+            before = square - _UP[k] * width - _RIGHT[k]
+            if mark[before] != RESTING or length[before] > most:
+                continue
+            total = length[before] + steps[int(_RIGHT[k] != 0 and _UP[k] != 0), square]
+            if total < least and not _shut(steps, square, k, width):
+                least = total
+        if least < UNREACHED:
+            length[square], mark[square] = least, WAITING
+            entries[used, 0], entries[used, 1], heads[least] = square, heads[least], used
+            used += 1
+    return used
 
 
 @numba.njit(cache=True)
-def _search(field, steps, start, reach, bins, aims, workspace, used, width):  # type: ignore[no-untyped-def]
-    length, direction, state = field
-    heads, entries, mark, _, rows = workspace
+def _search(  # type: ignore[no-untyped-def]
+    length, direction, state, steps, start, most, bins, aims, mark, heads, entries, used, rows
+):
+    """Take squares from the queue by length, and put there what they change."""
+    width = int(np.sqrt(len(length)))
     shift = _UP * width + _RIGHT
     for now in range(len(heads)):
         while heads[now] >= 0:
             square = entries[heads[now], 0]
             heads[now] = entries[heads[now], 1]
-            if length[square] != now or (mark[square] != KNOWN and mark[square] != WAITING):
+            if length[square] != now or not KNOWN <= mark[square] <= LOOKING:
                 continue
             if square == start:
                 mark[square] = CHANGED
-            elif not _settle(
-                length,
-                direction,
-                state,
-                steps,
-                start,
-                square,
-                now,
-                reach,
-                bins,
-                aims,
-                mark,
-                rows,
-                width,
-            ):
+            else:
+                _settle(
+                    length,
+                    direction,
+                    state,
+                    steps,
+                    start,
+                    square,
+                    now,
+                    most,
+                    bins,
+                    aims,
+                    mark,
+                    rows,
+                    width,
+                )
+            done, way = mark[square], state[square] & FROM
+            if done == SAME or now > most:
                 continue
-            way = state[square] & FROM
             for i in range(8):
                 k = _ONWARD[way, i]
                 if k < 0:
                     break
                 there = square + shift[k]
-                diagonal = _RIGHT[k] * _UP[k] != 0
-                step = steps[int(diagonal), there]
-                total = now + step
-                if step == 0 or total > length[there]:
-                    continue
-                beside = there - _RIGHT[k]
-                if diagonal and steps[0, square + _RIGHT[k]] == 0 and steps[0, beside] == 0:
-                    continue
-                if total < length[there]:
-                    length[there], mark[there] = total, KNOWN
-                    state[there] = (state[there] & SIGHT) | k
-                else:
-                    # as long as the path that is there: which one counts is known later
-                    waiting, mark[there] = mark[there], WAITING
-                    if waiting != RESTING:
+                if done == TURNED:
+                    total = length[there]
+                    if state[there] & FROM != k or mark[there] != RESTING or total > most:
                         continue
+                    mark[there] = LOOKING
+                else:
+                    diagonal = _RIGHT[k] * _UP[k] != 0
+                    step = steps[int(diagonal), there]
+                    total = now + step
+                    if step == 0 or total > length[there]:
+                        continue
+                    if diagonal and steps[0, square + _RIGHT[k]] == 0:
+                        if steps[0, there - _RIGHT[k]] == 0:
+                            continue
+                    waiting = mark[there]
+                    if total < length[there]:
+                        length[there], mark[there] = total, KNOWN
+                        state[there] = (state[there] & SIGHT) | k
+                    else:
+                        # as long as the path that is there: which one counts is known later
+                        mark[there] = WAITING
+                        if waiting != RESTING:
+                            continue
                 entries[used, 0], entries[used, 1], heads[total] = there, heads[total], used
                 used += 1
 
 
 @numba.njit(cache=True, inline="always")
 def _settle(  # type: ignore[no-untyped-def]
-    length, direction, state, steps, start, square, now, reach, bins, aims, mark, rows, width
+    length, direction, state, steps, start, square, now, most, bins, aims, mark, rows, width
 ):
-    """Set state and direction of a square of known length; return whether paths may change."""
+    """Set state, direction and mark of a square of known length."""
     waiting, old = mark[square], state[square]
     way, sight = old & FROM, old & SIGHT
-    mark[square] = CHANGED
     if waiting == WAITING:
-        way = _way(length, state, steps, square, now, reach * STRAIGHT, width)
-    if now > reach * STRAIGHT:
-        state[square], direction[square] = sight | way, bins
-        return False
+        way = _way(length, state, steps, square, now, most, width)
     before = square - _UP[way] * width - _RIGHT[way]
-    bent = state[before] & BENT
-    if bent == 0 and sight == UNKNOWN:
-        sight = CLEAR_SIGHT if is_clear(steps, start, square, width) else DARK
-    if bent != 0 or sight == DARK:
-        aim, bent = direction[before], BENT
-    else:
-        y, y0, centre = rows[square], rows[start], len(aims) // 2
-        aim = aims[y - y0 + centre, square - start - (y - y0) * width + centre]
-    same = old & (FROM | BENT) == way | bent and direction[square] == aim
-    state[square], direction[square] = sight | bent | way, aim
-    if waiting == WAITING and same and mark[before] != CHANGED:
+    kept = waiting != KNOWN and way == old & FROM and mark[before] != CHANGED
+    aim, bent = bins, 0
+    if now <= most:
+        bent = state[before] & BENT
+        if bent == 0 and sight == UNKNOWN:
+            sight = CLEAR_SIGHT if is_clear(steps, start, square, width) else DARK
+        if bent != 0 or sight == DARK:
+            aim, bent = direction[before], BENT
+        else:
+            y, y0, centre = rows[square], rows[start], len(aims) // 2
+            aim = aims[y - y0 + centre, square - start - (y - y0) * width + centre]
+    if not kept:
+        mark[square] = CHANGED
+    elif old & BENT == bent and direction[square] == aim:
         mark[square] = SAME
-        return False
-    return True
+    else:
+        mark[square] = TURNED
+    state[square], direction[square] = sight | bent | way, aim
 
 
 @numba.njit(cache=True)

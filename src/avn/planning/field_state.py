@@ -13,6 +13,7 @@ LONGEST = 31
 FROM, NOWHERE = 15, 8
 BENT = 16
 SIGHT, CLEAR_SIGHT, DARK, UNKNOWN = 96, 0, 32, 64
-# Marks of squares in a search: not looked at; waiting, with a known or an unknown predecessor;
-# done, with or without a change; and invalidated.
-RESTING, KNOWN, WAITING, CHANGED, SAME, INVALID = 0, 1, 2, 3, 4, 5
+# Marks of squares in a search: not looked at; waiting, with a known or an unknown predecessor, or
+# for its direction alone; done, without a change, with another direction, or with another path; and
+# invalidated.
+RESTING, KNOWN, WAITING, LOOKING, SAME, TURNED, CHANGED, INVALID = range(8)

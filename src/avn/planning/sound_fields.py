@@ -164,7 +164,8 @@ def sound_fields(
     fields = SoundFields(len(cost), position.shape[1], cost.shape[1], reach, bins)
     wanted = np.zeros(position.shape[:2], dtype=np.bool_)
     wanted[row, slot] = True
-    fields.update(cost, position, wanted, wanted.any(1))
+    active: NDArray[np.bool_] = np.asarray(wanted.any(1))
+    fields.update(cost, position, wanted, active)
     length[row, slot] = fields.length[row, slot]
     direction[row, slot] = fields.direction[row, slot]
 
@@ -205,15 +206,22 @@ def _update(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _copy_uniform(fields, n, k, x, y, plain):  # type: ignore[no-untyped-def]
+    """Set a field to the part of the uniform one around its start, which is in the middle."""
     size = fields[0].shape[2] - 2
-    # the start is in the middle of the uniform field
-    top, left = size - y, size - x
+    length, direction, state = fields[0][n, k], fields[1][n, k], fields[2][n, k]
+    left = size - x
     for row in range(size):
+        lengths, directions, states = (
+            plain[0][size - y + row],
+            plain[1][size - y + row],
+            plain[2][size - y + row],
+        )
         for column in range(size):
-            for_row, for_column = top + row, left + column
-            fields[0][n, k, row + 1, column + 1] = plain[0][for_row, for_column]
-            fields[1][n, k, row + 1, column + 1] = plain[1][for_row, for_column]
-            fields[2][n, k, row + 1, column + 1] = plain[2][for_row, for_column]
+            length[row + 1, column + 1] = lengths[left + column]
+        for column in range(size):
+            direction[row + 1, column + 1] = directions[left + column]
+        for column in range(size):
+            state[row + 1, column + 1] = states[left + column]
 
 
 @numba.njit(cache=True)
@@ -226,6 +234,11 @@ def _differences(steps, straight, diagonal, listed):  # type: ignore[no-untyped-
     width, count = steps.shape[1], 0
     every = straight == diagonal and straight > 0
     for y in range(1, width - 1):
+        differs = every
+        for x in range(1, width - 1):
+            differs |= (steps[0, y, x] != straight) | (steps[1, y, x] != diagonal)
+        if not differs:
+            continue
         for x in range(1, width - 1):
             if every or steps[0, y, x] != straight or steps[1, y, x] != diagonal:
                 flipped = (steps[0, y, x] == 0) != (straight == 0)
