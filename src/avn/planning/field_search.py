@@ -228,9 +228,9 @@ def _search(  # type: ignore[no-untyped-def]
                     total = now + step
                     if step == 0 or total > length[there]:
                         continue
-                    if diagonal and steps[0, square + _RIGHT[k]] == 0:
-                        if steps[0, there - _RIGHT[k]] == 0:
-                            continue
+                    beside = square + _RIGHT[k], there - _RIGHT[k]
+                    if diagonal and steps[0, beside[0]] == 0 and steps[0, beside[1]] == 0:
+                        continue
                     waiting = mark[there]
                     if total < length[there]:
                         length[there], mark[there] = total, KNOWN

@@ -34,21 +34,37 @@ def likely(log_belief: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @numba.njit(cache=True, parallel=True)
 def best_around(belief, offsets):  # type: ignore[no-untyped-def]
-    """Return the square with the greatest sum at some offsets, of those above 0: (R,) int64."""
+    """Return the square with the greatest sum at some offsets, of those above 0: (R,) int64.
+
+    The greatest value of each agent is 1, as by `likely`.
+    """
     size = belief.shape[1]
     best = np.zeros(len(belief), dtype=np.int64)
+    # with (0, 0) among the offsets the greatest sum is 1 or more, so one of its parts has a share
+    share = np.float32(0.5 / len(offsets) if (np.abs(offsets).sum(1) == 0).any() else 0.0)
     for n in numba.prange(len(belief)):
-        most = np.float32(0.0)
+        own, most = belief[n], np.float32(0.0)
+        hot = np.zeros(size, dtype=np.bool_)
+        for y in range(size):
+            found = False
+            for x in range(size):
+                found |= own[y, x] > share
+            hot[y] = found
         total = np.empty(size, dtype=np.float32)
         for y in range(size):
+            near = False
+            for i in range(len(offsets)):
+                near |= 0 <= y + offsets[i, 1] < size and hot[y + offsets[i, 1]]
+            if not near:
+                continue
             total[:] = 0.0
             for i in range(len(offsets)):
                 right, up = offsets[i, 0], offsets[i, 1]
                 if 0 <= y + up < size:
                     for x in range(max(0, -right), min(size, size - right)):
-                        total[x] += belief[n, y + up, x + right]
+                        total[x] += own[y + up, x + right]
             for x in range(size):
-                if total[x] > most and belief[n, y, x] > 0:
+                if total[x] > most and own[y, x] > 0:
                     most, best[n] = total[x], y * size + x
     return best
 
@@ -65,7 +81,7 @@ def score(  # type: ignore[no-untyped-def]
     """
     length, direction = fields
     bearing, log_length, precision = terms
-    size, slots = cost.shape[1], kept.shape[1]
+    size = cost.shape[1]
     # lengths of the fields, and one more for what was not reached
     lengths = min(reach * STRAIGHT + LONGEST + 2, _LENGTHS)
     logs = np.empty(lengths, dtype=np.float32)
@@ -77,7 +93,9 @@ def score(  # type: ignore[no-untyped-def]
         if not active[n]:
             continue
         log_belief[n, :, :] = -np.inf
-        weight, first_of, second_of = _tables(logs, kept[n], log_length[n], precision[n], bias)
+        places = np.flatnonzero(kept[n])
+        weight, errors = _tables(logs, places, log_length[n], precision[n], bias)
+        shared = weight + np.float32(1.0 / (bias * bias)) if bias > 0 else np.float32(np.inf)
         total, first, second = (
             np.empty(size, dtype=np.float32),
             np.empty(size, dtype=np.float32),
@@ -87,43 +105,42 @@ def score(  # type: ignore[no-untyped-def]
         left, right = max(x0 - reach, 0), min(x0 + reach + 1, size)
         for y in range(max(y0 - reach, 0), min(y0 + reach + 1, size)):
             total[:], first[:], second[:] = 0.0, 0.0, 0.0
-            for k in range(slots):
-                if not kept[n, k]:
-                    continue
-                for x in range(left, right):
-                    units = min(int(length[n, k, y + 1, x + 1]), lengths - 1)
-                    first[x] += first_of[k, units]
-                    second[x] += second_of[k, units]
-                    total[x] += bearing[n, k, direction[n, k, y + 1, x + 1]]
+            for i in range(len(places)):
+                k = places[i]
+                _add(length[n, k, y + 1], errors[i, 1], second, left, right)
+                _add(direction[n, k, y + 1], bearing[n, k], total, left, right)
+                if bias > 0:
+                    _add(length[n, k, y + 1], errors[i, 0], first, left, right)
             for x in range(left, right):
                 if cost[n, y, x] == np.inf or searched[n, y, x]:
                     continue
                 error = second[x]
                 # Gaussian errors with a shared part, which is integrated out
                 if bias > 0:
-                    error -= first[x] * first[x] / (weight + np.float32(1.0 / (bias * bias)))
+                    error -= first[x] * first[x] / shared
                 log_belief[n, y, x] = total[x] - np.float32(0.5) * error
 
 
 @numba.njit(cache=True)
-def _tables(logs, kept, log_length, precision, bias):  # type: ignore[no-untyped-def]
-    """Return the sum of the precisions, and for each place and length error and squared error.
+def _add(framed, table, sums, left, right):  # type: ignore[no-untyped-def]
+    """Add what a table has for the values of a row; the last entry is that of all above."""
+    last = np.uint64(len(table) - 1)
+    for x in range(left, right):
+        sums[x] += table[min(np.uint64(framed[x + 1]), last)]
 
-    The errors are weighted by the precision of the place.
-    """
+
+@numba.njit(cache=True)
+def _tables(logs, places, log_length, precision, bias):  # type: ignore[no-untyped-def]
+    """Return the sum of the precisions, and error and squared error of each place and length."""
     weight = np.float32(0.0)
-    first, second = (
-        np.empty((len(kept), len(logs)), dtype=np.float32),
-        np.empty((len(kept), len(logs)), dtype=np.float32),
-    )
-    for k in range(len(kept)):
-        if not kept[k]:
-            continue
+    errors = np.empty((len(places), 2, len(logs)), dtype=np.float32)
+    for i in range(len(places)):
+        k = places[i]
         weight += precision[k]
         most = _OUTLIER / math.sqrt(max(precision[k], _LEAST_PRECISION)) + 2 * bias
         for units in range(len(logs)):
             off = logs[units] - log_length[k]
             off = np.float32(min(max(off, -most), most))
-            first[k, units] = precision[k] * off
-            second[k, units] = precision[k] * off * off
-    return weight, first, second
+            errors[i, 0, units] = precision[k] * off
+            errors[i, 1, units] = precision[k] * off * off
+    return weight, errors

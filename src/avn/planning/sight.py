@@ -9,7 +9,6 @@ at the step i b / a along the other one, rounded, halves down. So square (i, j) 
 from __future__ import annotations
 
 import numba
-
 import numpy as np
 
 from avn.planning.field_state import DARK, SIGHT, UNKNOWN
