@@ -182,96 +182,125 @@ def _seed(length, steps, most, mark, invalid, heads, entries, width):  # type: i
 def _search(  # type: ignore[no-untyped-def]
     length, direction, state, steps, start, most, bins, aims, mark, heads, entries, used, rows
 ):
-    """Take squares from the queue by length, and put there what they change."""
+    """Settle the squares of the queue by length, and put there what they change."""
     width = int(np.sqrt(len(length)))
-    shift = _UP * width + _RIGHT
     for now in range(len(heads)):
-        while heads[now] >= 0:
-            square = entries[heads[now], 0]
-            heads[now] = entries[heads[now], 1]
-            if length[square] != now or not KNOWN <= mark[square] <= LOOKING:
-                continue
-            if square == start:
-                mark[square] = CHANGED
-            else:
-                _settle(
-                    length,
-                    direction,
-                    state,
-                    steps,
-                    start,
-                    square,
-                    now,
-                    most,
-                    bins,
-                    aims,
-                    mark,
-                    rows,
-                    width,
-                )
-            done, way = mark[square], state[square] & FROM
-            if done == SAME or now > most:
-                continue
-            for i in range(8):
-                k = _ONWARD[way, i]
-                if k < 0:
-                    break
-                there = square + shift[k]
-                if done == TURNED:
-                    total = length[there]
-                    if state[there] & FROM != k or mark[there] != RESTING or total > most:
-                        continue
-                    mark[there] = LOOKING
-                else:
-                    diagonal = _RIGHT[k] * _UP[k] != 0
-                    step = steps[int(diagonal), there]
-                    total = now + step
-                    if step == 0 or total > length[there]:
-                        continue
-                    beside = square + _RIGHT[k], there - _RIGHT[k]
-                    if diagonal and steps[0, beside[0]] == 0 and steps[0, beside[1]] == 0:
-                        continue
-                    waiting = mark[there]
-                    if total < length[there]:
-                        length[there], mark[there] = total, KNOWN
-                        state[there] = (state[there] & SIGHT) | k
-                    else:
-                        # as long as the path that is there: which one counts is known later
-                        mark[there] = WAITING
-                        if waiting != RESTING:
-                            continue
-                entries[used, 0], entries[used, 1], heads[total] = there, heads[total], used
-                used += 1
+        first, heads[now] = heads[now], -1
+        if first < 0:
+            continue
+        _choose_ways(length, state, steps, now, most, mark, entries, first, width)
+        _settle(
+            length,
+            direction,
+            state,
+            steps,
+            start,
+            now,
+            most,
+            bins,
+            aims,
+            mark,
+            entries,
+            first,
+            rows,
+        )
+        if now <= most:
+            used = _spread(
+                length, state, steps, now, most, mark, heads, entries, first, used, width
+            )
 
 
-@numba.njit(cache=True, inline="always")
-def _settle(  # type: ignore[no-untyped-def]
-    length, direction, state, steps, start, square, now, most, bins, aims, mark, rows, width
-):
-    """Set state, direction and mark of a square of known length."""
-    waiting, old = mark[square], state[square]
-    way, sight = old & FROM, old & SIGHT
-    if waiting == WAITING:
+@numba.njit(cache=True)
+def _choose_ways(length, state, steps, now, most, mark, entries, first, width):  # type: ignore[no-untyped-def]
+    """Choose the predecessors of squares of one length where several paths are as long."""
+    entry = first
+    while entry >= 0:
+        square, entry = entries[entry, 0], entries[entry, 1]
+        if length[square] != now or mark[square] != WAITING:
+            continue
         way = _way(length, state, steps, square, now, most, width)
-    before = square - _UP[way] * width - _RIGHT[way]
-    kept = waiting != KNOWN and way == old & FROM and mark[before] != CHANGED
-    aim, bent = bins, 0
-    if now <= most:
-        bent = state[before] & BENT
-        if bent == 0 and sight == UNKNOWN:
-            sight = CLEAR_SIGHT if is_clear(steps, start, square, width) else DARK
-        if bent != 0 or sight == DARK:
-            aim, bent = direction[before], BENT
+        before = square - _UP[way] * width - _RIGHT[way]
+        if way == state[square] & FROM and mark[before] != CHANGED:
+            mark[square] = LOOKING
         else:
-            y, y0, centre = rows[square], rows[start], len(aims) // 2
-            aim = aims[y - y0 + centre, square - start - (y - y0) * width + centre]
-    if not kept:
-        mark[square] = CHANGED
-    elif old & BENT == bent and direction[square] == aim:
-        mark[square] = SAME
-    else:
-        mark[square] = TURNED
-    state[square], direction[square] = sight | bent | way, aim
+            mark[square], state[square] = KNOWN, (state[square] & (BENT | SIGHT)) | way
+
+
+@numba.njit(cache=True)
+def _settle(  # type: ignore[no-untyped-def]
+    length, direction, state, steps, start, now, most, bins, aims, mark, entries, first, rows
+):
+    """Set state and direction of the squares of one length, and what is new of them."""
+    width, y0, centre = int(np.sqrt(len(length))), rows[start], len(aims) // 2
+    entry = first
+    while entry >= 0:
+        square, entry = entries[entry, 0], entries[entry, 1]
+        waiting, old = mark[square], state[square]
+        if length[square] != now or (waiting != KNOWN and waiting != LOOKING):
+            continue
+        way, sight, aim, bent = old & FROM, old & SIGHT, bins, 0
+        if now <= most and square != start:
+            before = square - _UP[way] * width - _RIGHT[way]
+            bent = state[before] & BENT
+            if bent == 0 and sight == UNKNOWN:
+                sight = CLEAR_SIGHT if is_clear(steps, start, square, width) else DARK
+            if bent != 0 or sight == DARK:
+                aim, bent = direction[before], BENT
+            else:
+                up = rows[square] - y0
+                aim = aims[up + centre, square - start - up * width + centre]
+        if waiting == KNOWN:
+            mark[square] = CHANGED
+        elif old & BENT == bent and direction[square] == aim:
+            mark[square] = SAME
+        else:
+            mark[square] = TURNED
+        state[square], direction[square] = sight | bent | way, aim
+
+
+@numba.njit(cache=True)
+def _spread(length, state, steps, now, most, mark, heads, entries, first, used, width):  # type: ignore[no-untyped-def]
+    """Put into the queue what squares of one length change; return the length of the queue."""
+    entry = first
+    while entry >= 0:
+        square, entry = entries[entry, 0], entries[entry, 1]
+        news, way = mark[square], state[square] & FROM
+        if length[square] != now or (news != CHANGED and news != TURNED):
+            continue
+        for i in range(8):
+            k = _ONWARD[way, i]
+            if k < 0:
+                break
+            there = square + _UP[k] * width + _RIGHT[k]
+            if news == TURNED:
+                total = int(length[there])
+                if state[there] & FROM != k or mark[there] != RESTING or total > most:
+                    continue
+                mark[there] = LOOKING
+            else:
+                diagonal = _RIGHT[k] * _UP[k] != 0
+                step = steps[int(diagonal), there]
+                total = now + step
+                if step == 0 or total > length[there]:
+                    continue
+                beside = square + _RIGHT[k], there - _RIGHT[k]
+                if diagonal and steps[0, beside[0]] == 0 and steps[0, beside[1]] == 0:
+                    continue
+                waiting, old = mark[there], state[there] & FROM
+                if total < length[there]:
+                    length[there], mark[there] = total, KNOWN
+                    state[there] = (state[there] & SIGHT) | k
+                elif old == NOWHERE or length[there - _UP[old] * width - _RIGHT[old]] >= now:
+                    # as long as the path that is there: which one counts is known later
+                    mark[there] = WAITING
+                    if waiting != RESTING:
+                        continue
+                else:
+                    # the path that is there was found before
+                    continue
+            entries[used, 0], entries[used, 1], heads[total] = there, heads[total], used
+            used += 1
+    return used
 
 
 @numba.njit(cache=True)
