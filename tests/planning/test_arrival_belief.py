@@ -157,3 +157,31 @@ def test_without_shared_error_it_is_the_sum_over_the_places():
     narrow = walk(rooms(), poses, source, ArrivalModel(bias=1e-4)).log_belief
     there = np.isfinite(none)
     np.testing.assert_allclose(narrow[there], none[there], atol=0.05)
+
+
+def test_the_best_square_has_the_greatest_probability_around_it():
+    rng = np.random.default_rng(0)
+    offsets = np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (2, -1)])
+    belief = ArrivalBelief(40, 15, 8, ArrivalModel())
+    belief.log_belief[:] = rng.normal(0, 2, belief.log_belief.shape)
+    belief.log_belief[rng.random(belief.log_belief.shape) < 0.5] = -np.inf
+    every = np.ones(40, np.bool_)
+    found = belief.targets(np.ones((40, 15, 15), np.float32), every, offsets)
+    position = np.stack(np.meshgrid(np.arange(15), np.arange(15)), -1).reshape(-1, 2)
+    for n in range(40):
+        share = np.exp(belief.log_belief[n].astype(np.float64))
+        wide = np.pad(share, 2)
+        around = np.array(
+            [sum(wide[y + 2 + v, x + 2 + u] for u, v in offsets) for x, y in position]
+        )
+        around[share.ravel() == 0] = 0
+        assert tuple(found[n]) == tuple(position[around.argmax()])
+
+
+def test_near_answers_for_active_agents_alone():
+    belief = ArrivalBelief(3, 9, 8, ArrivalModel())
+    belief.log_belief[:] = np.random.default_rng(1).normal(size=belief.log_belief.shape)
+    position, offsets = np.full((3, 2), 4), np.array([(0, 0), (1, 1)])
+    active = np.array([True, False, True])
+    every, some = belief.near(position, offsets), belief.near(position, offsets, active)
+    assert np.array_equal(some, np.where(active, every, 0))

@@ -160,7 +160,7 @@ class BeliefAgent(PlannerAgent):
         enough = self.stop_above
         if self.stop_half_life is not None:
             enough *= 0.5 ** (self._actions / self.stop_half_life)
-        stops = self._belief.near(position, self._goal) >= enough
+        stops = self._belief.near(position, self._goal, self._active) >= enough
         # nothing more will be learnt: the likeliest square is the best guess
         ended = (self._silent >= self.silent_after) & self._belief.informed()
         at_target = (self._targets(self._active & ended) == position).all(1)

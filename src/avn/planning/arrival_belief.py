@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.actions import HEADINGS
+from avn.planning.posterior import best_around, likely, parts, score
 from avn.planning.searched import Searched
 from avn.planning.settings import ArrivalModel
-from avn.planning.sound_fields import SQUARES, sound_fields
+from avn.planning.sound_fields import SoundFields
 
 # Weight below which evidence is left out.
 _LEAST_WEIGHT = 1e-3
-_LEAST_PRECISION = 1e-6
-# Length in units of `sound_fields` up to which logarithms are tabulated.
-_LENGTHS = 4096
-# Standard deviations at which the error of a length is cut off, so that no outlier decides.
-_OUTLIER = 4.0
 
 
 class ArrivalBelief(Searched):
@@ -61,11 +55,7 @@ class ArrivalBelief(Searched):
         self._bearing = np.zeros((n, slots, HEADINGS, bins), dtype=np.float32)
         self._distance = np.zeros((n, slots, HEADINGS, 2), dtype=np.float32)
         self._count = np.zeros((n, slots, HEADINGS), dtype=np.float32)
-        # fields of the places, and whether they are those of the present graph
-        self._length = np.zeros((n, slots, size, size), dtype=np.int16)
-        self._direction = np.full((n, slots, size, size), bins, dtype=np.uint8)
-        self._valid = np.zeros((n, slots), dtype=np.bool_)
-        self._blocked = np.zeros((n, size, size), dtype=np.bool_)
+        self._fields = SoundFields(n, slots, size, model.reach, bins)
 
     def hear(
         self,
@@ -99,7 +89,7 @@ class ArrivalBelief(Searched):
         self._weight[moved] *= self.model.kept
         place = moved, self._newest[moved]
         self._position[place], self._weight[place] = pose[moved, :2], 1.0
-        self._valid[place] = False
+        self._fields.forget(*place)
         for own in (self._bearing, self._distance, self._count):
             own[place] = 0.0
         heading = pose[rows, 2]
@@ -119,8 +109,8 @@ class ArrivalBelief(Searched):
     def score(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> None:
         """Compute the posterior on the graphs of now.
 
-        The fields of earlier places are computed anew only where a square has become a node, or is
-        none any more.
+        The fields of earlier places are repaired only where a square has become a node, or is none
+        any more.
 
         Parameters
         ----------
@@ -129,28 +119,14 @@ class ArrivalBelief(Searched):
         active : (N,) bool
             Agents to update.
         """
-        blocked = np.isinf(cost)
-        self._valid[(blocked != self._blocked).any((1, 2))] = False
-        self._blocked = blocked
         kept = (self._weight > _LEAST_WEIGHT) & active[:, None]
-        stale_row, stale_slot = np.nonzero(kept & ~self._valid)
-        sound_fields(
-            cost,
-            self._position,
-            stale_row,
-            stale_slot,
-            self.model.reach,
-            self.bins,
-            self._length,
-            self._direction,
-        )
-        self._valid[stale_row, stale_slot] = True
+        self._fields.update(cost, self._position, kept, active)
         row, slot = np.nonzero(kept)
         bearing = np.zeros((*kept.shape, self.bins + 1), dtype=np.float32)
         log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))
         bearing[row, slot] = self._bearing_terms(row, slot)
         log_length[row, slot], precision[row, slot] = self._length_terms(row, slot)
-        _score(
+        score(
             self.log_belief,
             cost,
             self.searched,
@@ -159,7 +135,7 @@ class ArrivalBelief(Searched):
             self._here,
             self.model.reach,
             self.model.bias,
-            (self._length, self._direction),
+            self._fields.framed,
             (bearing, log_length, precision),
         )
 
@@ -167,8 +143,8 @@ class ArrivalBelief(Searched):
         """Return the weighted log-probability of each direction, and of none, (R, B + 1)."""
         count, model = self._count[row, slot], self.model
         mean = self._bearing[row, slot] / np.maximum(count, 1)[..., None]
-        likely = np.log((1 - model.blur) * np.exp(mean) + model.blur / self.bins)
-        summed = (likely * (count > 0)[..., None]).sum(1)
+        terms = np.log((1 - model.blur) * np.exp(mean) + model.blur / self.bins)
+        summed = (terms * (count > 0)[..., None]).sum(1)
         terms = model.bearing_weight * self._weight[row, slot][:, None] * summed
         # beyond the reach is less likely than the least likely direction
         return np.concatenate((terms, terms.min(1, keepdims=True) - 5), 1)
@@ -209,20 +185,29 @@ class ArrivalBelief(Searched):
             succeed there: the square with the greatest probability of success is returned. By
             default the likeliest square of the source.
         """
-        flat = self.log_belief.reshape(len(cost), -1)
-        none = active & ~np.isfinite(flat.max(1))
-        if none.any():
-            self.searched[none] = False
+        best = np.zeros(len(cost), dtype=np.int64)
+        rows = np.flatnonzero(active)
+        best[rows], there = self._best(rows, offsets)
+        if not there.all():
+            again = rows[~there]
+            self.searched[again] = False
+            none = np.zeros_like(active)
+            none[again] = True
             self.score(cost, none)
-        best = flat.argmax(1)
-        if offsets is not None:
-            rows = np.flatnonzero(active)
-            best[rows] = (
-                _most_around(self.log_belief[rows], offsets)
-                .reshape(len(rows), flat.shape[1])
-                .argmax(1)
-            )
+            best[again], _ = self._best(again, offsets)
         return np.stack((best % cost.shape[1], best // cost.shape[1]), 1)
+
+    def _best(
+        self, rows: NDArray[np.int64], offsets: NDArray[np.int64] | None
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the flat index of the best square, and whether there is any, (R,) each."""
+        best, there = np.zeros(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.bool_)
+        for part in parts(len(rows)):
+            own = self.log_belief[rows[part]]
+            flat = own.reshape(len(own), -1)
+            there[part] = np.isfinite(flat.max(1))
+            best[part] = flat.argmax(1) if offsets is None else best_around(likely(own), offsets)
+        return best, there
 
     def heard_around(self) -> NDArray[np.bool_]:
         """Return whether each agent has listened with all four headings where it is, (N,)."""
@@ -232,7 +217,12 @@ class ArrivalBelief(Searched):
         """Return whether each agent has heard anything, (N,)."""
         return np.asarray((self._weight > _LEAST_WEIGHT).any(1))
 
-    def near(self, position: NDArray[np.int64], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
+    def near(
+        self,
+        position: NDArray[np.int64],
+        offsets: NDArray[np.int64],
+        active: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.float64]:
         """Return the probability that the source is at some offsets from each agent, (N,).
 
         Parameters
@@ -241,69 +231,17 @@ class ArrivalBelief(Searched):
             Column and row of the agents.
         offsets : (k, 2) int64
             Offsets in columns and rows.
+        active : (N,) bool, optional
+            Agents to answer for, all by default; 0 for the others.
         """
-        flat = self.log_belief.reshape(len(position), -1)
-        top = flat.max(1)
-        belief = np.exp(flat - np.where(np.isfinite(top), top, 0.0)[:, None])
+        found = np.zeros(len(position), dtype=np.float64)
+        rows = np.arange(len(position)) if active is None else np.flatnonzero(active)
         size = self.log_belief.shape[1]
         squares = np.clip(position[:, None] + offsets, 0, size - 1)
-        own = np.take_along_axis(belief, squares[..., 1] * size + squares[..., 0], 1)
-        found: NDArray[np.float64] = own.sum(1) / np.maximum(belief.sum(1), 1e-30)
+        index = squares[..., 1] * size + squares[..., 0]
+        for part in parts(len(rows)):
+            own = rows[part]
+            belief = likely(self.log_belief[own]).reshape(len(own), -1)
+            nearby = np.take_along_axis(belief, index[own], 1).sum(1)
+            found[own] = nearby / np.maximum(belief.sum(1), 1e-30)
         return found
-
-
-def _most_around(
-    log_belief: NDArray[np.float32], offsets: NDArray[np.int64]
-) -> NDArray[np.float32]:
-    """Return the probability around each square, up to a factor; 0 where the source cannot be."""
-    top = log_belief.max((1, 2), keepdims=True)
-    belief = np.exp(log_belief - np.where(np.isfinite(top), top, 0))
-    most = int(np.abs(offsets).max(initial=0))
-    wide = np.pad(belief, ((0, 0), (most, most), (most, most)))
-    size = log_belief.shape[1]
-    total = np.zeros_like(belief)
-    for column, row in offsets:
-        rows, columns = (slice(most + off, most + off + size) for off in (row, column))
-        total += wide[:, rows, columns]
-    return np.where(belief > 0, total, np.float32(0))
-
-
-@numba.njit(cache=True, parallel=True)
-def _score(  # type: ignore[no-untyped-def]
-    log_belief, cost, searched, active, kept, position, reach, bias, fields, terms
-):
-    length, direction = fields
-    bearing, log_length, precision = terms
-    size, slots = cost.shape[1], kept.shape[1]
-    logs = np.empty(_LENGTHS, dtype=np.float32)
-    logs[0] = math.log(0.5)  # of the square where the agent is
-    for i in range(1, len(logs)):
-        logs[i] = math.log(i * SQUARES)
-    for n in numba.prange(len(cost)):
-        if not active[n]:
-            continue
-        log_belief[n, :, :] = -np.inf
-        x0, y0 = position[n, 0], position[n, 1]
-        for y in range(max(y0 - reach, 0), min(y0 + reach + 1, size)):
-            for x in range(max(x0 - reach, 0), min(x0 + reach + 1, size)):
-                if cost[n, y, x] == np.inf or searched[n, y, x]:
-                    continue
-                total = np.float32(0.0)
-                # sums over the places of 1, error and squared error, weighted by precision
-                weight = first = second = np.float32(0.0)
-                for k in range(slots):
-                    if kept[n, k]:
-                        units = min(int(length[n, k, y, x]), _LENGTHS - 1)
-                        off = logs[units] - log_length[n, k]
-                        most = (
-                            _OUTLIER / math.sqrt(max(precision[n, k], _LEAST_PRECISION)) + 2 * bias
-                        )
-                        off = np.float32(min(max(off, -most), most))
-                        weight += precision[n, k]
-                        first += precision[n, k] * off
-                        second += precision[n, k] * off * off
-                        total += bearing[n, k, direction[n, k, y, x]]
-                # Gaussian errors with a shared part, which is integrated out
-                if bias > 0:
-                    second -= first * first / (weight + np.float32(1.0 / (bias * bias)))
-                log_belief[n, y, x] = total - np.float32(0.5) * second

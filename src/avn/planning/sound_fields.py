@@ -5,28 +5,141 @@ its map, a field has for every other square the length of the shortest path to i
 in which this path leaves: towards the square if no square in between is blocked, else towards the
 last square of the path that is in sight. Paths go to all eight neighbours of a square and are found
 with a queue of buckets (Dial, "Algorithm 360: shortest-path forest with topological ordering",
-Communications of the ACM 12, 1969).
+Communications of the ACM 12, 1969), which are stacks. When the map changes, fields are repaired:
+see `field_search`.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-# Units of length on a free square, straight and diagonal; their ratio is sqrt(2) within 1 %.
-STRAIGHT, DIAGONAL = 5, 7
-# Length of what was not reached, and factor from units to squares.
-UNREACHED = 32767
+from avn.planning.field_search import new_workspace, repair
+from avn.planning.field_state import DIAGONAL, LONGEST, NOWHERE, STRAIGHT, UNKNOWN, UNREACHED
+
+__all__ = ["DIAGONAL", "SQUARES", "STRAIGHT", "UNREACHED", "SoundFields", "sound_fields"]
+
+# Factor from units of length to squares.
 SQUARES = 1.0 / STRAIGHT
-_BUCKETS = 64
-# Longest step in units, so that the queue has a bucket for each; half of the buckets.
-_LONGEST = 31
+# Changes of each map that are remembered; if there were more, its fields are computed anew.
+_REMEMBERED = 512
 
 
-@numba.njit(cache=True, parallel=True)
+class SoundFields:
+    """Fields of K places of each of N agents, kept up to date with their maps.
+
+    Parameters
+    ----------
+    n, places, size : int
+        N, K, and squares M along each side of a map.
+    reach : int
+        Squares up to which paths are followed.
+    bins : int
+        Number of directions B, at most 255; bin b is centred at b/B turns clockwise from the front
+        of the map.
+
+    Attributes
+    ----------
+    length : (N, K, M, M) int16
+        Length of the path to each square, in units of `SQUARES`; `UNREACHED` beyond.
+    direction : (N, K, M, M) uint8
+        Bin of the direction in which it leaves; `bins` where the agent is, and beyond.
+    framed : pair of (N, K, M + 2, M + 2) arrays
+        Both with a margin of one square, contiguous.
+    """
+
+    def __init__(self, n: int, places: int, size: int, reach: int, bins: int) -> None:
+        self.reach, self.bins = reach, bins
+        width = size + 2
+        shape = (n, places, width, width)
+        self.framed = (
+            np.full(shape, UNREACHED, dtype=np.int16),
+            np.full(shape, bins, dtype=np.uint8),
+        )
+        self._state = np.full(shape, NOWHERE, dtype=np.uint8)
+        self.length, self.direction = (own[:, :, 1:-1, 1:-1] for own in self.framed)
+        # the maps of now, and the units of a straight and a diagonal step to each square
+        self._cost = np.full((n, size, size), np.nan, dtype=np.float32)
+        self._steps = np.zeros((n, 2, width, width), dtype=np.uint8)
+        # a ring of changes of each map, their number, and how many each field knows
+        self._changes = np.zeros((n, _REMEMBERED), dtype=np.int32)
+        self._changed = np.zeros(n, dtype=np.int64)
+        self._known = np.full((n, places), -1, dtype=np.int64)
+        # whether no square has become a node, or is none any more, since a field was computed
+        self._valid = np.zeros((n, places), dtype=np.bool_)
+        self._aims = _aims(size, bins)
+        self._plain: tuple[Any, ...] | None = None
+
+    def forget(self, row: NDArray[np.int64], slot: NDArray[np.int64]) -> None:
+        """Forget the fields of places with new positions, (R,) agents and (R,) places."""
+        self._valid[row, slot], self._known[row, slot] = False, -1
+
+    def update(
+        self,
+        cost: NDArray[np.float32],
+        position: NDArray[np.int64],
+        wanted: NDArray[np.bool_],
+        active: NDArray[np.bool_],
+    ) -> None:
+        """Bring fields up to date.
+
+        A field that is there changes only where a square has become a node, or is none any more,
+        in the map of its agent: then it becomes that of the present costs.
+
+        Parameters
+        ----------
+        cost : (N, M, M) float32
+            Cost of entering each square, 1 or more; infinite without a node. See `PartialGraph`. A
+            step has at most 31 units of length, so costs above 4.4 are 4.4 on a diagonal, above
+            6.2 else.
+        position : (N, K, 2) int64
+            Column and row of the places.
+        wanted : (N, K) bool
+            Fields to bring up to date.
+        active : (N,) bool
+            Agents whose maps may have changed; `wanted` is of these.
+        """
+        flipped = _compare(cost, self._cost, self._steps, self._changes, self._changed, active)
+        self._valid[flipped] = False
+        row, slot = np.nonzero(wanted & ~self._valid)
+        if not len(row):
+            return
+        if self._plain is None:
+            self._plain = self._uniform(cost[row[0], 0, 0])
+        _update(
+            (*self.framed, self._state),
+            self._steps,
+            (self._changes, self._changed, self._known),
+            (row, slot),
+            position,
+            (self.reach, self.bins),
+            self._aims,
+            self._plain,
+            4 * numba.get_num_threads(),
+        )
+        self._valid[row, slot] = True
+
+    def _uniform(self, cost: np.float32) -> tuple[Any, ...]:
+        """Return a field without boundaries or walls, from which fields are made, and its steps."""
+        width = 2 * self._cost.shape[1] + 1
+        steps = np.zeros((2, width, width), dtype=np.uint8)
+        straight, diagonal = _units(cost)
+        steps[0, 1:-1, 1:-1], steps[1, 1:-1, 1:-1] = straight, diagonal
+        length = np.zeros((width, width), dtype=np.int16)
+        direction, state = (np.zeros((width, width), dtype=np.uint8) for _ in range(2))
+        state[:] = NOWHERE | (0 if straight else UNKNOWN)
+        everything = 2 * np.arange(width * width)
+        flat = length.ravel(), direction.ravel(), state.ravel()
+        start, aims = width * width // 2, _aims(width - 2, self.bins)
+        work = new_workspace(width * width, self.reach)
+        repair(flat, steps.reshape(2, -1), start, self.reach, self.bins, aims, everything, work)
+        return length, direction, state, straight, diagonal
+
+
 def sound_fields(
     cost: NDArray[np.float32],
     position: NDArray[np.int64],
@@ -41,106 +154,147 @@ def sound_fields(
 
     Parameters
     ----------
-    cost : (N, M, M) float32
-        Cost of entering each square, 1 or more; infinite without a node. See `PartialGraph`. A step
-        has at most 31 units of length, so costs above 4.4 are 4.4 on a diagonal, above 6.2 else.
-    position : (N, K, 2) int64
-        Column and row at which each of N agents has been K times.
+    cost, position, reach, bins
+        See `SoundFields`.
     row, slot : (R,) int64
         Indices of the fields: agent, and place from which they are seen.
-    reach : int
-        Squares up to which paths are followed.
-    bins : int
-        Number of directions B, at most 255; bin b is centred at b/B turns clockwise from the front
-        of the map.
-    length : (N, K, M, M) int16
-        Set to the length of the path to each square, in units of `SQUARES`; `UNREACHED` beyond.
-    direction : (N, K, M, M) uint8
-        Set to the bin of the direction in which it leaves; `bins` where the agent is, and beyond.
+    length, direction : (N, K, M, M) int16 and uint8
+        Set to the values of `SoundFields` for these fields.
     """
-    for i in numba.prange(len(row)):
-        n, k = row[i], slot[i]
-        _field(cost[n], position[n, k], reach, bins, length[n, k], direction[n, k])
+    fields = SoundFields(len(cost), position.shape[1], cost.shape[1], reach, bins)
+    wanted = np.zeros(position.shape[:2], dtype=np.bool_)
+    wanted[row, slot] = True
+    active: NDArray[np.bool_] = np.asarray(wanted.any(1))
+    fields.update(cost, position, wanted, active)
+    length[row, slot] = fields.length[row, slot]
+    direction[row, slot] = fields.direction[row, slot]
+
+
+@numba.njit(cache=True, parallel=True)
+def _update(  # type: ignore[no-untyped-def]
+    fields, steps, log, chosen, position, limits, aims, plain, parts
+):
+    row, slot = chosen
+    reach, bins = limits
+    changes, changed, known = log
+    width, remembered = steps.shape[2], changes.shape[1]
+    flat = width * width
+    parts = min(parts, len(row))
+    for part in numba.prange(parts):
+        workspace = new_workspace(flat, reach)
+        listed = np.empty(max(flat, remembered), dtype=np.int32)
+        for i in range(part, len(row), parts):
+            n, k = row[i], slot[i]
+            x, y = position[n, k, 0], position[n, k, 1]
+            missed = changed[n] - known[n, k]
+            if known[n, k] < 0 or missed > remembered:
+                _copy_uniform(fields, n, k, x, y, plain)
+                count = _differences(steps[n], plain[3], plain[4], listed)
+            else:
+                count = missed
+                for j in range(missed):
+                    listed[j] = changes[n, (known[n, k] + j) % remembered]
+            field = (
+                fields[0][n, k].reshape(flat),
+                fields[1][n, k].reshape(flat),
+                fields[2][n, k].reshape(flat),
+            )
+            own, start = steps[n].reshape((2, flat)), (y + 1) * width + x + 1
+            repair(field, own, start, reach, bins, aims, listed[:count], workspace)
+            known[n, k] = changed[n]
 
 
 @numba.njit(cache=True)
-def _field(cost, position, reach, bins, length, direction):  # type: ignore[no-untyped-def]
-    size = cost.shape[0]
-    length[:], direction[:] = UNREACHED, bins
-    first = np.full(_BUCKETS, -1, dtype=np.int32)
-    capacity = 9 * size * size
-    waiting = np.empty(capacity, dtype=np.int32)
-    following = np.empty(capacity, dtype=np.int32)
-    # square from which the straight line ends: -1 while the square itself is in sight
-    bend = np.full(size * size, -1, dtype=np.int32)
-    before = np.full(size * size, -1, dtype=np.int32)
-    closed = np.zeros(size * size, dtype=np.bool_)
-    px, py = position[0], position[1]
-    start = py * size + px
-    length[py, px] = 0
-    waiting[0], following[0], first[0] = start, -1, 0
-    used, left, now, most = 1, 1, 0, reach * STRAIGHT
-    while left and now <= most:
-        bucket = now % _BUCKETS
-        while first[bucket] >= 0:
-            entry = first[bucket]
-            first[bucket] = following[entry]
-            left -= 1
-            square = waiting[entry]
-            y, x = square // size, square % size
-            if closed[square] or length[y, x] != now:
+def _copy_uniform(fields, n, k, x, y, plain):  # type: ignore[no-untyped-def]
+    """Set a field to the part of the uniform one around its start, which is in the middle."""
+    size = fields[0].shape[2] - 2
+    length, direction, state = fields[0][n, k], fields[1][n, k], fields[2][n, k]
+    left = size - x
+    for row in range(size):
+        lengths, directions, states = (
+            plain[0][size - y + row],
+            plain[1][size - y + row],
+            plain[2][size - y + row],
+        )
+        for column in range(size):
+            length[row + 1, column + 1] = lengths[left + column]
+        for column in range(size):
+            direction[row + 1, column + 1] = directions[left + column]
+        for column in range(size):
+            state[row + 1, column + 1] = states[left + column]
+
+
+@numba.njit(cache=True)
+def _differences(steps, straight, diagonal, listed):  # type: ignore[no-untyped-def]
+    """List the squares of a map whose steps are not those of a uniform one; return how many.
+
+    If a diagonal step is as long as a straight one, paths of the uniform map may lie outside of the
+    map, so all squares are listed.
+    """
+    width, count = steps.shape[1], 0
+    every = straight == diagonal and straight > 0
+    for y in range(1, width - 1):
+        differs = every
+        for x in range(1, width - 1):
+            differs |= (steps[0, y, x] != straight) | (steps[1, y, x] != diagonal)
+        if not differs:
+            continue
+        for x in range(1, width - 1):
+            if every or steps[0, y, x] != straight or steps[1, y, x] != diagonal:
+                flipped = (steps[0, y, x] == 0) != (straight == 0)
+                listed[count] = 2 * (y * width + x) + flipped
+                count += 1
+    return count
+
+
+@numba.njit(cache=True, parallel=True)
+def _compare(cost, last, steps, changes, changed, active):  # type: ignore[no-untyped-def]
+    """Note how maps have changed; return where a square was blocked or freed, (N,) bool."""
+    size, width, remembered = cost.shape[1], cost.shape[1] + 2, changes.shape[1]
+    flipped = np.zeros(len(cost), dtype=np.bool_)
+    for n in numba.prange(len(cost)):
+        if not active[n]:
+            continue
+        for y in range(size):
+            differs = False
+            for x in range(size):
+                differs |= cost[n, y, x] != last[n, y, x]
+            if not differs:
                 continue
-            closed[square] = True
-            if square != start:
-                parent = before[square]
-                if bend[parent] >= 0:
-                    bend[square] = bend[parent]
-                elif not _clear(cost, px, py, x, y):
-                    bend[square] = parent
-                aim = square if bend[square] < 0 else bend[square]
-                direction[y, x] = _bin(aim % size - px, aim // size - py, bins)
-            for v in range(max(y - 1, 0), min(y + 2, size)):
-                for u in range(max(x - 1, 0), min(x + 2, size)):
-                    there = v * size + u
-                    if closed[there] or cost[v, u] == np.inf:
-                        continue
-                    step = STRAIGHT
-                    if u != x and v != y:
-                        if cost[v, x] == np.inf and cost[y, u] == np.inf:
-                            continue
-                        step = DIAGONAL
-                    total = now + min(int(step * cost[v, u] + 0.5), _LONGEST)
-                    if total < length[v, u]:
-                        length[v, u], before[there] = total, square
-                        slot = total % _BUCKETS
-                        waiting[used], following[used] = there, first[slot]
-                        first[slot] = used
-                        used += 1
-                        left += 1
-        now += 1
+            for x in range(size):
+                if cost[n, y, x] == last[n, y, x]:
+                    continue
+                last[n, y, x] = cost[n, y, x]
+                straight, diagonal = _units(cost[n, y, x])
+                before = steps[n, 0, y + 1, x + 1]
+                if straight == before and diagonal == steps[n, 1, y + 1, x + 1]:
+                    continue
+                steps[n, 0, y + 1, x + 1], steps[n, 1, y + 1, x + 1] = straight, diagonal
+                flip = (straight == 0) != (before == 0)
+                flipped[n] |= flip
+                square = (y + 1) * width + x + 1
+                changes[n, changed[n] % remembered] = 2 * square + flip
+                changed[n] += 1
+    return flipped
 
 
 @numba.njit(cache=True)
-def _bin(right, front, bins):  # type: ignore[no-untyped-def]
-    turns = math.atan2(right, front) / (2 * math.pi)
-    return round(turns * bins) % bins
+def _units(cost):  # type: ignore[no-untyped-def]
+    """Return the units of a straight and of a diagonal step to a square, 0 if it is blocked."""
+    if cost == np.inf:
+        return 0, 0
+    return (
+        min(int(STRAIGHT * cost + 0.5), LONGEST),
+        min(int(DIAGONAL * cost + 0.5), LONGEST),
+    )
 
 
 @numba.njit(cache=True)
-def _clear(cost, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
-    # squares on the line between the centres (Bresenham), without its ends
-    dx, dy = abs(x1 - x0), abs(y1 - y0)
-    sx, sy = (1 if x1 > x0 else -1), (1 if y1 > y0 else -1)
-    error, x, y = dx - dy, x0, y0
-    while True:
-        twice = 2 * error
-        if twice > -dy:
-            error -= dy
-            x += sx
-        if twice < dx:
-            error += dx
-            y += sy
-        if x == x1 and y == y1:
-            return True
-        if cost[y, x] == np.inf:
-            return False
+def _aims(size, bins):  # type: ignore[no-untyped-def]
+    """Return the bin of the direction of each offset in rows and columns, (2 M - 1, 2 M - 1)."""
+    aims = np.empty((2 * size - 1, 2 * size - 1), dtype=np.uint8)
+    for y in range(2 * size - 1):
+        for x in range(2 * size - 1):
+            turns = math.atan2(x - size + 1, y - size + 1) / (2 * math.pi)
+            aims[y, x] = round(turns * bins) % bins
+    return aims
