@@ -142,7 +142,9 @@ def _render_direct_paths(job: _Job) -> DirectPaths:
 
 
 def build_reverberation(
-    files: Sequence[tuple[Scene, Path, str]], acoustics: AcousticsConfig, processes: int
+    files: Sequence[tuple[Scene, NDArray[np.int32], Path, str]],
+    acoustics: AcousticsConfig,
+    processes: int,
 ) -> None:
     """Render the reverberation of apartments in worker processes, one job for each source.
 
@@ -151,14 +153,14 @@ def build_reverberation(
 
     Parameters
     ----------
-    files : sequence of (Scene, Path, str)
-        Each apartment, its file, and the fingerprint of the file.
+    files : sequence of (Scene, array, Path, str)
+        Each apartment, the cells of its sources, its file, and the fingerprint of the file.
     acoustics : AcousticsConfig
         Settings.
     processes : int
         Number of worker processes.
     """
-    jobs = [_jobs(scene, acoustics, path) for scene, path, _ in files]
+    jobs = [_jobs(scene, places, acoustics, path) for scene, places, path, _ in files]
     todo = [job for scene_jobs in jobs for job in scene_jobs if not job.part.is_file()]
     left = Parts([[job.part for job in scene_jobs] for scene_jobs in jobs])
     for index in left.whole:
@@ -174,18 +176,22 @@ def build_reverberation(
                     _assemble(files[index], acoustics, jobs[index])
 
 
-def _jobs(scene: Scene, acoustics: AcousticsConfig, path: Path) -> list[_Job]:
+def _jobs(
+    scene: Scene, places: NDArray[np.int32], acoustics: AcousticsConfig, path: Path
+) -> list[_Job]:
     parts, centres = partial_folder(path), scene.grid.centres
     return [
         _Job(scene.plan, acoustics, tuple(centres[cell]), centres, parts / f"source-{k:03d}.npz")
-        for k, cell in enumerate(scene.sources)
+        for k, cell in enumerate(places)
     ]
 
 
 def _assemble(
-    to_write: tuple[Scene, Path, str], acoustics: AcousticsConfig, jobs: list[_Job]
+    to_write: tuple[Scene, NDArray[np.int32], Path, str],
+    acoustics: AcousticsConfig,
+    jobs: list[_Job],
 ) -> None:
-    scene, path, fingerprint = to_write
+    scene, _, path, fingerprint = to_write
     pairs = (len(jobs), scene.grid.cells)
 
     def fill(file: h5py.File) -> None:
@@ -204,7 +210,11 @@ def _assemble(
 
 
 def build_direct_sound(
-    scene: Scene, acoustics: AcousticsConfig, path: Path, fingerprint: str
+    scene: Scene,
+    places: NDArray[np.int32],
+    acoustics: AcousticsConfig,
+    path: Path,
+    fingerprint: str,
 ) -> None:
     """Write the direct paths of an apartment in the regime of `acoustics`.
 
@@ -212,6 +222,8 @@ def build_direct_sound(
     ----------
     scene : Scene
         The apartment.
+    places : (K,) int32
+        Cells of the sources.
     acoustics : AcousticsConfig
         Settings.
     path : Path
@@ -219,7 +231,7 @@ def build_direct_sound(
     fingerprint : str
         Hash of all that the file depends on; it is stored in it.
     """
-    paths = [_render_direct_paths(job) for job in _jobs(scene, acoustics, path)]
+    paths = [_render_direct_paths(job) for job in _jobs(scene, places, acoustics, path)]
 
     def fill(file: h5py.File) -> None:
         file["samples"] = np.stack([p.samples for p in paths])
