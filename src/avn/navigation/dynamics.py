@@ -107,7 +107,7 @@ class Course:
 
     def mix(self, actions: Tensor) -> SoundMix | None:
         """Return what N agents hear after some numbers of actions; None for the steady sound."""
-        return self._heard(torch.arange(len(actions)), actions)
+        return self._heard(torch.arange(len(actions)), actions, actions)
 
     def of_episode(self, row: int, count: int, walked: int) -> SoundMix | None:
         """Return what is heard in each second of an episode.
@@ -119,22 +119,21 @@ class Course:
         count, walked : int
             Number of its actions, and of those during which the source may move.
         """
-        return self._heard(torch.full((count + 1,), row), torch.arange(count + 1), walked)
+        passed = torch.arange(count + 1)
+        return self._heard(torch.full_like(passed, row), passed, passed.clamp(max=walked))
 
-    def _heard(self, rows: Tensor, actions: Tensor, walked: int | None = None) -> SoundMix | None:
+    def _heard(self, rows: Tensor, passed: Tensor, walked: Tensor) -> SoundMix | None:
+        """Return what is heard after some numbers of actions, and of those of the source."""
         if not self.dynamics.changes_sound:
             return None
-        passed = actions.double()
-        begin, end = self.begin[rows] - passed, self.end[rows] - passed
+        begin, end = (times[rows] - passed.double() for times in (self.begin, self.end))
         place = before = torch.full_like(rows, -1)
         if self.walk is not None:
             # the responses of all cells follow those of the sources
-            now = actions.clamp(max=walked)
-            place, before = (
-                self._sources + self.cells(rows, own)
-                for own in (now, (actions - 1).clamp(0, walked))
-            )
-        return SoundMix(begin, end, self.other_source[rows], self.other_sound[rows], place, before)
+            place = self._sources + self.cells(rows, walked)
+            before = self._sources + self.cells(rows, (passed - 1).clamp(min=0).minimum(walked))
+        other = self.other_source[rows], self.other_sound[rows]
+        return SoundMix(begin, end, *other, place, before)
 
     def carried_out(self, actions: Tensor, counts: Tensor) -> tuple[Tensor, Tensor]:
         """Return what becomes of the actions of N agents.
