@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from omegaconf import DictConfig
 
 from avn.acoustics import brir
@@ -116,11 +114,6 @@ class _Acoustic(PerApartment):
         """Part of the name of a file."""
         return "acoustics-squares" if self.squares else "acoustics"
 
-    def _places(self, scene: Scene) -> NDArray[np.int32]:
-        """Return the cells of the sources of an apartment's file."""
-        every = np.arange(scene.grid.cells * self.squares, dtype=np.int32)
-        return np.concatenate((scene.sources, every))
-
     def check(self) -> None:
         """Refuse invalid acoustics."""
         acoustics_of(self.apartments)
@@ -174,11 +167,8 @@ class LateReverberation(_Acoustic):
     def make(self) -> None:
         """Trace the missing files in worker processes."""
         scenes, acoustics = self.needs()[0].load(), acoustics_of(self.apartments)
-        files = [
-            (scenes[i], self._places(scenes[i]), self.paths[i], self.fingerprints[i])
-            for i in self.missing()
-        ]
-        build.build_reverberation(files, acoustics, self.cfg.processes)
+        files = [(scenes[i], self.paths[i], self.fingerprints[i]) for i in self.missing()]
+        build.build_reverberation(files, acoustics, self.cfg.processes, self.squares)
 
 
 class DirectSound(_Acoustic):
@@ -216,18 +206,20 @@ class DirectSound(_Acoustic):
         """Compute and write the missing files."""
         scenes, acoustics = self.needs()[0].load(), acoustics_of(self.apartments)
         for index in self.missing():
-            scene, path = scenes[index], self.paths[index]
-            places = self._places(scene)
-            build.build_direct_sound(scene, places, acoustics, path, self.fingerprints[index])
+            file = self.paths[index], self.fingerprints[index]
+            build.build_direct_sound(scenes[index], acoustics, *file, self.squares)
 
     def load(self) -> list[AudibleScene]:
         """Return the scene of each apartment with its binaural room impulse responses."""
         geometry, tails = self.needs()
         tail_files = zip(tails.paths, tails.fingerprints, strict=True)
         first_files = zip(self.paths, self.fingerprints, strict=True)
+        files = zip(geometry.load(), tail_files, first_files, strict=True)
         return [
-            scene.with_brirs(Brirs(tail, first, len(self._places(scene)), scene.grid.cells))
-            for scene, tail, first in zip(geometry.load(), tail_files, first_files, strict=True)
+            scene.with_brirs(
+                Brirs(*own, len(build.sounding_cells(scene, self.squares)), scene.grid.cells)
+            )
+            for scene, *own in files
         ]
 
 
