@@ -15,6 +15,7 @@ from avn.apartments.floor_plan import FloorPlan
 from avn.core.files import check_name
 from avn.core.settings import typed
 from avn.dataset import build
+from avn.dataset.build import sounding_cells
 from avn.dataset.scene import AudibleScene, Brirs, Scene, load_scene
 from avn.pipeline.apartments import (
     TEST,
@@ -217,9 +218,9 @@ class DirectSound(_Acoustic):
         files = zip(geometry.load(), tail_files, first_files, strict=True)
         return [
             scene.with_brirs(
-                Brirs(*own, len(build.sounding_cells(scene, self.squares)), scene.grid.cells)
+                Brirs(tail, first, len(sounding_cells(scene, self.squares)), scene.grid.cells)
             )
-            for scene, *own in files
+            for scene, tail, first in files
         ]
 
 
