@@ -194,6 +194,7 @@ LACKING = {
     "schedule": ("draw",),
     "distractor": ("check", "draw"),
     "odometry": ("failures",),
+    "motion": ("walk",),
     "renderer": ("prepare", "views"),
     "backbone": ("pooled",),
 }

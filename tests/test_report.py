@@ -221,7 +221,7 @@ def test_what_comes_from_names_is_shown_and_never_run(browser, tmp_path):
     run = PageRun(evil, evil, evil, True, summarise(episodes), episodes, {0: 0})
     pixel = page_media.view_url(np.zeros((4, 4, 3), dtype=np.uint8))
     plan = {"image": pixel, "left": 0.0, "top": 4.0, "width": 4.0, "height": 4.0}
-    episode = {"title": evil, "outcome": evil, "goal": [1, 1], "path": [[1, 1, 0], [1, 2, 0]]}
+    episode = {"title": evil, "outcome": evil, "goals": [[1, 1]], "path": [[1, 1, 0], [1, 2, 0]]}
     episode |= {
         "action": [0],
         "collided": [0, 0],

@@ -4,7 +4,9 @@ import pytest
 
 from avn.agents.oracle import Oracle
 from avn.agents.rollout import Labels, rollout_scene
+from avn.navigation.dynamics import Dynamics
 from avn.navigation.episodes import exhaustive_episodes
+from avn.navigation.motion import Motion
 from avn.navigation.navigation_scene import DrawnScene
 from avn.navigation.protocols import Protocol
 
@@ -53,6 +55,19 @@ def test_oracle_arrives_before_the_cap(
         assert (frame["success"] == 1).all()
         assert (frame["spl"] == 1.0).all()
         assert (frame["actions"] == frame["fewest_actions"]).all()
+
+
+def test_oracle_catches_a_walking_source_as_early_as_can_be(flat, protocol) -> None:
+    rules = dataclasses.replace(protocol, max_moves_ratio=None)
+    episodes = exhaustive_episodes(flat, ["ring"], rules, seed=0)
+    walking = Dynamics(motion=Motion(0.6))
+    frame = rollout_scene(Oracle(), flat, episodes, rules, LABELS, dynamics=walking)
+    assert (frame["success"] == 1).all()
+    assert (frame["dspl"] == 1.0).all()
+    assert (frame["actions"] == frame["fewest_actions_to_catch"]).all()
+    assert (frame["collisions"] == 0).all()
+    before = frame["fewest_actions_to_catch"] < frame["fewest_actions"]
+    assert before.any(), "some sources come to meet the agent"
 
 
 def test_oracle_says_that_it_is_privileged() -> None:

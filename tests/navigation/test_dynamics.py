@@ -25,7 +25,7 @@ DISTRACTOR = Distractor({"bark": "dog", "ring": "telephone"})
 class Heard:
     """Audio observation that is what it was asked to render."""
 
-    sounds, realisations, shape = 2, 1, (4,)
+    sounds, realisations, shape = 2, 1, (len(SoundMix._fields),)
 
     def __call__(self, clip, mix=None):
         mix = mix or SoundMix.steady(len(clip.state))

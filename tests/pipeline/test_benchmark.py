@@ -120,7 +120,8 @@ def test_the_world_is_named_with_what_was_changed(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "option", ["schedule=intermittent", "distractor=other_category", "odometry=noisy"]
+    "option",
+    ["schedule=intermittent", "distractor=other_category", "odometry=noisy", "motion=walking"],
 )
 def test_the_papers_results_do_not_stand_beside_a_world_that_changes(option):
     cfg = composed("agent=random_walk", option)

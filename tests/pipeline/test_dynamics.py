@@ -12,7 +12,7 @@ from avn.config.saved import read_config
 from avn.core.errors import UserError
 from avn.pipeline import replay
 from avn.pipeline.apartments import Apartments
-from avn.pipeline.dynamics import build_dynamics, check_dynamics
+from avn.pipeline.dynamics import STEADY, build_dynamics, check_dynamics
 from avn.pipeline.observed import RunObservations
 from avn.pipeline.run import Evaluation
 
@@ -58,7 +58,7 @@ def test_equal_runs_have_equal_bytes(command, outputs):
 def test_a_steady_world_keeps_its_fingerprint_whatever_the_groups_are():
     cfg = composed(ROW)
     read = Evaluation(cfg).read()
-    assert not [key for key in read if key.split(".")[0] in ("schedule", "distractor", "odometry")]
+    assert not [key for key in read if key.split(".")[0] in STEADY]
     other = composed(ROW, "schedule=intermittent")
     assert Evaluation(other).fingerprint != Evaluation(cfg).fingerprint
 

@@ -138,7 +138,7 @@ class Recorder:
             exploration_trajectory=episodes.trajectories[episodes.trajectory_index[row]]
             if explores
             else None,
-            mix=simulator.course.of_episode(row, count),
+            mix=simulator.course.of_episode(row, count, int(simulator.walked[row])),
         )
 
 

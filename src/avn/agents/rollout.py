@@ -19,7 +19,8 @@ from avn.core.random import derive
 from avn.navigation.distances import actions_to_cells, fewest_actions
 from avn.navigation.dynamics import Dynamics
 from avn.navigation.episodes import Episodes
-from avn.navigation.metrics import sna, soft_spl, spl
+from avn.navigation.metrics import dynamic_spl, sna, soft_spl, spl
+from avn.navigation.motion import earliest_catch
 from avn.navigation.navigation_scene import NavigationScene
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
@@ -172,7 +173,8 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
         if protocol.path_length == "metres"
         else simulator.attempted.numpy().astype(np.float64)
     )
-    shortest, remaining = distances.shortest[source, start], distances.shortest[source, end]
+    last, place = simulator.to_source()
+    shortest, remaining = distances.shortest[source, start], last.shortest[place.numpy(), end]
     success, actions = simulator.success.numpy(), simulator.actions.numpy()
     fewest, to_source = _fewest(simulator), _fewest_to_source(simulator)
     return pd.DataFrame(
@@ -205,7 +207,7 @@ def records(simulator: Simulator, labels: Labels) -> pd.DataFrame:
             "spl": spl(success, path, shortest),
             "softspl": soft_spl(remaining, path, shortest),
             "sna": sna(success, actions, to_source),
-            "dtg": CELL * distances.source_moves[source, end],
+            "dtg": CELL * last.source_moves[place.numpy(), end],
             "sna_goal": sna(success, actions, fewest),
         }
         | _course(simulator)
@@ -232,7 +234,28 @@ def _course(simulator: Simulator) -> dict[str, np.ndarray]:
     if dynamics.odometry:
         found["slips"] = simulator.slips.numpy()
         found["drift"] = CELL * simulator.drift().numpy()
-    return found
+    return found | _motion(simulator)
+
+
+def _motion(simulator: Simulator) -> dict[str, np.ndarray]:
+    """Return the columns of a moving source; none if it stays where it is."""
+    walk, episodes = simulator.course.walk, simulator.episodes
+    if walk is None:
+        return {}
+    last, place = simulator.to_source()
+    stop = int(simulator.protocol.requires_stop)
+    # a Stop is an action too
+    walk = walk[:, : simulator.protocol.max_actions + 1 - stop]
+    fewest, _ = earliest_catch(simulator.scene.grid, last.goal, walk.numpy(), episodes.start)
+    before = simulator.distances.source_moves[episodes.source, episodes.start // HEADINGS]
+    after = last.source_moves[place.numpy(), simulator.state.numpy() // HEADINGS]
+    success, actions = simulator.success.numpy(), simulator.actions.numpy()
+    return {
+        "source_end_cell": place.numpy(),
+        "fewest_actions_to_catch": fewest + stop,
+        "dspl": dynamic_spl(success, actions, fewest + stop),
+        "ndtg": after / before,
+    }
 
 
 def _fewest(simulator: Simulator) -> np.ndarray:

@@ -12,7 +12,7 @@ from avn.config.folder import conf_folder
 from avn.config.python import composing
 
 # Groups whose options a run names besides its row.
-_GROUPS = ("split", "acoustics", "protocol", "schedule", "distractor", "odometry")
+_GROUPS = ("split", "acoustics", "protocol", "schedule", "distractor", "odometry", "motion")
 
 
 def default_config(cfg: DictConfig) -> DictConfig:

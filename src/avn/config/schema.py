@@ -166,6 +166,7 @@ class CoreConfig:
     schedule: NamedOption = MISSING
     distractor: NamedOption = MISSING
     odometry: NamedOption = MISSING
+    motion: NamedOption = MISSING
     sound: dict[str, str] = MISSING
     training: TrainingConfig = field(default_factory=TrainingConfig)
     sound_model: NamedOption = MISSING
@@ -254,6 +255,7 @@ BASES: dict[str, type] = {
     "schedule": NamedOption,
     "distractor": NamedOption,
     "odometry": NamedOption,
+    "motion": NamedOption,
     "renderer": RendererConfig,
     "backbone": BackboneConfig,
 }
@@ -271,6 +273,7 @@ INTERFACES = {
     "schedule": "avn.navigation.schedule.Schedule",
     "distractor": "avn.navigation.distractor.Distractor",
     "odometry": "avn.navigation.odometry_noise.OdometryNoise",
+    "motion": "avn.navigation.motion.Motion",
     "renderer": "avn.views.renderer.Renderer",
     "backbone": "avn.views.backbone.Backbone",
 }

@@ -1,4 +1,4 @@
-"""Mix of a second of sound: when its source sounds, and a second source."""
+"""Mix of a second of sound: when and where its source sounds, and a second source."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from torch import Tensor
 
 
 class SoundMix(NamedTuple):
-    """Part of a second in which the source of N agents sounds, and a second source.
+    """Part of a second in which the source of N agents sounds, its place, and a second source.
 
     Attributes
     ----------
@@ -19,19 +19,23 @@ class SoundMix(NamedTuple):
         source that has always sounded began at minus infinity.
     other_source, other_sound : (N,) int64 tensor
         Index of a second source that sounds all the time, and of its recording; -1 for none.
+    place, place_before : (N,) int64 tensor
+        Index of the place of a moving source among the responses of the apartment, in this second
+        and in the one before; -1 for its own place.
     """
 
     begin: Tensor
     end: Tensor
     other_source: Tensor
     other_sound: Tensor
+    place: Tensor
+    place_before: Tensor
 
     @classmethod
     def steady(cls, n: int) -> SoundMix:
         """Return the mix of N agents whose only source sounds all the time."""
         ends = torch.full((2, n), math.inf, dtype=torch.float64)
-        none = torch.full((2, n), -1)
-        return cls(-ends[0], ends[1], none[0], none[1])
+        return cls(-ends[0], ends[1], *torch.full((4, n), -1))
 
     def clipped(self, memory: float) -> SoundMix:
         """Return the mix that sounds the same, with the least different beginnings and ends.

@@ -141,8 +141,17 @@ def _render_direct_paths(job: _Job) -> DirectPaths:
     return brir.render_direct_paths(walls(job.plan), source, receivers, job.acoustics)
 
 
+def sounding_cells(scene: Scene, squares: bool = False) -> NDArray[np.int32]:
+    """Return the cells of the sources; with `squares`, every free cell follows them."""
+    every = np.arange(scene.grid.cells if squares else 0, dtype=np.int32)
+    return np.concatenate((scene.sources, every))
+
+
 def build_reverberation(
-    files: Sequence[tuple[Scene, Path, str]], acoustics: AcousticsConfig, processes: int
+    files: Sequence[tuple[Scene, Path, str]],
+    acoustics: AcousticsConfig,
+    processes: int,
+    squares: bool = False,
 ) -> None:
     """Render the reverberation of apartments in worker processes, one job for each source.
 
@@ -157,8 +166,10 @@ def build_reverberation(
         Settings.
     processes : int
         Number of worker processes.
+    squares : bool
+        Whether each free square has a source too; see `sounding_cells`.
     """
-    jobs = [_jobs(scene, acoustics, path) for scene, path, _ in files]
+    jobs = [_jobs(scene, acoustics, path, squares) for scene, path, _ in files]
     todo = [job for scene_jobs in jobs for job in scene_jobs if not job.part.is_file()]
     left = Parts([[job.part for job in scene_jobs] for scene_jobs in jobs])
     for index in left.whole:
@@ -174,11 +185,11 @@ def build_reverberation(
                     _assemble(files[index], acoustics, jobs[index])
 
 
-def _jobs(scene: Scene, acoustics: AcousticsConfig, path: Path) -> list[_Job]:
+def _jobs(scene: Scene, acoustics: AcousticsConfig, path: Path, squares: bool) -> list[_Job]:
     parts, centres = partial_folder(path), scene.grid.centres
     return [
         _Job(scene.plan, acoustics, tuple(centres[cell]), centres, parts / f"source-{k:03d}.npz")
-        for k, cell in enumerate(scene.sources)
+        for k, cell in enumerate(sounding_cells(scene, squares))
     ]
 
 
@@ -204,7 +215,7 @@ def _assemble(
 
 
 def build_direct_sound(
-    scene: Scene, acoustics: AcousticsConfig, path: Path, fingerprint: str
+    scene: Scene, acoustics: AcousticsConfig, path: Path, fingerprint: str, squares: bool = False
 ) -> None:
     """Write the direct paths of an apartment in the regime of `acoustics`.
 
@@ -218,8 +229,10 @@ def build_direct_sound(
         The file.
     fingerprint : str
         Hash of all that the file depends on; it is stored in it.
+    squares : bool
+        Whether each free square has a source too; see `sounding_cells`.
     """
-    paths = [_render_direct_paths(job) for job in _jobs(scene, acoustics, path)]
+    paths = [_render_direct_paths(job) for job in _jobs(scene, acoustics, path, squares)]
 
     def fill(file: h5py.File) -> None:
         file["samples"] = np.stack([p.samples for p in paths])

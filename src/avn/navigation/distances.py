@@ -48,9 +48,21 @@ class Distances:
     crossings: NDArray[np.int64]
 
 
-def measure(scene: NavigationScene, protocol: Protocol) -> Distances:
-    """Compute the distances of a scene under a protocol."""
-    grid, sources = scene.grid, np.asarray(scene.sources)
+def measure(
+    scene: NavigationScene, protocol: Protocol, places: NDArray[np.int32] | None = None
+) -> Distances:
+    """Compute the distances of a scene under a protocol.
+
+    Parameters
+    ----------
+    scene : NavigationScene
+        Apartment.
+    protocol : Protocol
+        Defines the goal cells and the unit of path length.
+    places : (K,) int, optional
+        Cells of the sources; those of the scene by default.
+    """
+    grid, sources = scene.grid, np.asarray(scene.sources if places is None else places)
     goal = protocol.goal_cells(grid, sources)
     source_moves = grid.distances[sources].astype(np.int64)
     goal_moves = _moves_to(goal, grid)

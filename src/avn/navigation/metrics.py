@@ -79,3 +79,26 @@ def sna(success: ArrayLike, actions: ArrayLike, fewest: ArrayLike) -> Floats:
     (N,) float64
     """
     return spl(success, actions, fewest)
+
+
+def dynamic_spl(success: ArrayLike, actions: ArrayLike, fewest: ArrayLike) -> Floats:
+    """Compute dynamic SPL (DSPL) for a moving goal: S a* / max(a, a*).
+
+    Younes et al., "Catch Me If You Hear Me: Audio-Visual Navigation in Complex Unmapped
+    Environments with Moving Sounds", 2022.
+
+    Parameters
+    ----------
+    success : (N,) array_like
+        S, 1 for success and 0 for failure.
+    actions : (N,) array_like
+        a, the number of actions, including rotations and Stop.
+    fewest : (N,) array_like
+        a*, the fewest actions of an agent that knows the walk of the goal, including rotations and
+        Stop; above 0. See `avn.navigation.motion.earliest_catch`.
+
+    Returns
+    -------
+    (N,) float64
+    """
+    return spl(success, actions, fewest)

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from avn.core.actions import ACTIONS, BACKWARD, STOP, action_error
+from avn.core.actions import ACTIONS, BACKWARD, HEADINGS, STOP, action_error
 from avn.core.clip_id import ClipId
 from avn.core.random import scramble
 from avn.navigation.distances import Distances, measure
@@ -87,7 +87,11 @@ class Simulator:
         if observed.sounds not in (None, sounds):
             raise ValueError(f"clips of {observed.sounds} sounds, but episodes of {sounds}")
         self.tables = build_scene_batch([scene], protocol, [observed], sounds)
-        self.course = Course(dynamics or Dynamics(), episodes, len(scene.sources))
+        self.course = Course(dynamics or Dynamics(), episodes, scene, protocol.max_actions)
+        self._everywhere: Distances | None = None
+        if self.course.walk is not None:
+            self._everywhere = measure(scene, protocol, np.arange(scene.grid.cells, dtype=np.int32))
+            self._goal = torch.from_numpy(self._everywhere.goal)
         self._goal_row = self.tables.goal_row[self.source]
         self._origin = self.tables.origin(self.start)
         self.max_attempts = self.tables.most_moves[self._goal_row + self.start]
@@ -97,6 +101,20 @@ class Simulator:
     def __len__(self) -> int:
         """Return N."""
         return len(self.start)
+
+    @property
+    def walked(self) -> Tensor:
+        """Number of actions during which a moving source may have moved, (N,) int64.
+
+        It does not move during Stop, which is judged by what the agent has heard.
+        """
+        return self.actions - self.stopped.long()
+
+    def to_source(self) -> tuple[Distances, Tensor]:
+        """Return the distances to where the sources are now, and the row of each agent's."""
+        if self._everywhere is None:
+            return self.distances, self.source
+        return self._everywhere, self.course.cells(torch.arange(len(self)), self.walked)
 
     @property
     def moves(self) -> Tensor:
@@ -141,6 +159,10 @@ class Simulator:
         # without effect, as Stop
         effective = torch.where(slips, STOP, actions)
         reached, blocked, arrived = advance(self.tables, self._goal_row, self.state, effective)
+        if self.course.walk is not None:
+            walked = self.actions + (running & (actions != STOP))
+            cells = self.course.cells(torch.arange(len(self)), walked)
+            arrived = self._goal[cells, reached // HEADINGS]
         again = self.tables.following[reached * ACTIONS + actions]
         self.state = torch.where(running, torch.where(twice, again, reached), self.state)
         self._reckoned = torch.where(

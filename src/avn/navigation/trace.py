@@ -66,8 +66,8 @@ class Trace:
     exploration_trajectory : (W,) int64, or None
         States of the exploration trajectory of an agent that explores.
     mix : SoundMix, or None
-        When the source sounds in each of the T + 1 seconds, and the distractor; None for the
-        steady sound of the source.
+        When and where the source sounds in each of the T + 1 seconds, and the distractor; None
+        for the steady sound of the source.
     """
 
     scene: NavigationScene
@@ -90,5 +90,15 @@ class Trace:
 
     @property
     def goal(self) -> NDArray[np.float64]:
-        """Position of the source, metres east and north, (2,)."""
+        """Position of the source at the beginning, metres east and north, (2,)."""
         return self.scene.grid.centres[self.scene.sources[self.source]]
+
+    @property
+    def goals(self) -> NDArray[np.float64]:
+        """Positions of the source at each step, metres east and north, (T + 1, 2)."""
+        sources = np.asarray(self.scene.sources)
+        cells = np.full(len(self.state), sources[self.source])
+        if self.mix is not None:
+            walk = self.mix.place.numpy() - len(sources)
+            cells = np.where(self.mix.place.numpy() < 0, cells, walk)
+        return self.scene.grid.centres[cells]

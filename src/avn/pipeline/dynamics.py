@@ -13,7 +13,7 @@ from avn.navigation.dynamics import Dynamics
 from avn.pipeline.sounds import sound_categories, sound_files
 
 # Groups of the config, as the attributes of `Dynamics`, and the options by which nothing changes.
-STEADY = {"schedule": "continuous", "distractor": "none", "odometry": "exact"}
+STEADY = {"schedule": "continuous", "distractor": "none", "odometry": "exact", "motion": "still"}
 GROUPS = tuple(STEADY)
 
 

@@ -18,7 +18,7 @@ from avn.core.prefetch import prefetch, threads_for_one_operation
 from avn.core.sound_mix import SoundMix
 from avn.pipeline.audio_inference import AudioInference
 from avn.pipeline.rendered_audio import Output, RenderedClips, Waveforms, batches
-from avn.pipeline.scenes import DirectSound
+from avn.pipeline.scenes import heard_sound
 from avn.pipeline.stage import Stage
 from avn.pipeline.told import is_told, told_categories
 
@@ -43,7 +43,7 @@ class LiveInference(Waveforms):
 
     def needs(self) -> Sequence[Stage]:
         """Return the stages of the apartments' acoustics and of the network."""
-        return (DirectSound(self.cfg, self.apartments), self._table.network)
+        return (heard_sound(self.cfg, self.apartments), self._table.network)
 
     def settings(self) -> Sequence[str]:
         """Return the keys of the table."""

@@ -220,8 +220,8 @@ class Observed:
 
     @property
     def mixed(self) -> bool:
-        """True if sounds begin or end in an episode, or are heard with another one."""
-        return bool({"schedule", "distractor"} & {*changing(self.cfg)})
+        """True if sounds begin, end or move in an episode, or are heard with another one."""
+        return bool({"schedule", "distractor", "motion"} & {*changing(self.cfg)})
 
     def is_true(self, name: str) -> bool:
         """Return whether an observation is ground truth."""
@@ -260,7 +260,7 @@ class Observed:
             if self.mixed and any(OBSERVATIONS[name].audio for name in shown):
                 raise UserError(
                     f"agent.oracle_inputs: '{truth}' is known of steady sounds alone; take "
-                    "schedule=continuous and distractor=none"
+                    "schedule=continuous, distractor=none and motion=still"
                 )
         for name in wanted:
             start = f"agent {agent} needs the observation '{name}'"

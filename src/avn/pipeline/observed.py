@@ -18,7 +18,7 @@ from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.rendered_audio import RenderedClips, unchanged
 from avn.pipeline.replay import Run
-from avn.pipeline.scenes import DirectSound
+from avn.pipeline.scenes import DirectSound, heard_sound
 from avn.pipeline.sounds import dry_sounds
 from avn.pipeline.stage import build
 from avn.pipeline.views import RenderedViews
@@ -27,7 +27,7 @@ from avn.pipeline.views import RenderedViews
 def observed_stages(cfg: DictConfig) -> tuple[DirectSound, RenderedViews]:
     """Return the stages of a run's acoustics and views."""
     apartments = Apartments(cfg, cfg.subset)
-    return DirectSound(cfg, apartments), RenderedViews(cfg, apartments)
+    return heard_sound(cfg, apartments), RenderedViews(cfg, apartments)
 
 
 class RunObservations:

@@ -23,7 +23,7 @@ from avn.dataset.scene import AudibleScene
 from avn.modules.spectrogram import Spectrogram
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import Clips, check_realisations
-from avn.pipeline.scenes import DirectSound
+from avn.pipeline.scenes import heard_sound
 from avn.pipeline.sounds import dry_sounds, sounds_content
 from avn.pipeline.stage import Stage
 
@@ -65,7 +65,7 @@ class Waveforms(Stage):
 
     def needs(self) -> Sequence[Stage]:
         """Return the stage of the apartments' acoustics."""
-        return (DirectSound(self.cfg, self.apartments),)
+        return (heard_sound(self.cfg, self.apartments),)
 
     def settings(self) -> Sequence[str]:
         """Return the keys of the microphone and of the realisations."""
@@ -208,16 +208,25 @@ class RenderedClips:
     def at_ears(self, clip: ClipId, mix: SoundMix | None = None) -> Tensor:
         """Return the sound at the ears, without microphones, (N, 2, rate) float32."""
         renderer, rate = self._renderer, self._renderer.sounds.rate
-        brirs = self._brirs.gather(clip.source, clip.state)
+        place = clip.source if mix is None else torch.where(mix.place < 0, clip.source, mix.place)
+        brirs = self._brirs.gather(place, clip.state)
         found = renderer.at_ears(brir_spectra(brirs, rate), clip)
         if mix is None:
             return found
         mix = mix.clipped(self.memory)
-        switched = ((mix.begin > -self.memory) | (mix.end < 1)).nonzero()[:, 0]
+        moved = mix.place_before != mix.place
+        switched = ((mix.begin > -self.memory) | (mix.end < 1) | moved).nonzero()[:, 0]
         if len(switched):
             own = ClipId(*(part[switched] for part in clip))
-            ends = mix.begin[switched], mix.end[switched]
-            found[switched] = renderer.between(brirs[switched], own, *ends)
+            begin, end = mix.begin[switched], mix.end[switched]
+            begin = torch.where(moved[switched], begin.clamp(min=0), begin)
+            found[switched] = renderer.between(brirs[switched], own, begin, end)
+        left = moved.nonzero()[:, 0]
+        if len(left):  # what is still heard of the seconds before comes from where the source was
+            own = ClipId(*(part[left] for part in clip))
+            brirs = self._brirs.gather(mix.place_before[left], own.state)
+            ends = mix.begin[left], mix.end[left].clamp(max=0)
+            found[left] += renderer.between(brirs, own, *ends)
         both = (mix.other_source >= 0).nonzero()[:, 0]
         if len(both):
             own = ClipId(*(part[both] for part in clip))

@@ -128,7 +128,9 @@ def draw_belief(axes: Axes, trace: Trace, beliefs: BeliefTrace, step: int) -> An
         axes.plot(
             *trace.source_estimates[step], "P", color="#1f6fb2", mec="white", markersize=9, zorder=7
         )
-    axes.plot(*trace.goal, "*", color="#ffb000", mec="black", mew=0.8, markersize=12, zorder=7)
+    axes.plot(
+        *trace.goals[step], "*", color="#ffb000", mec="black", mew=0.8, markersize=12, zorder=7
+    )
     left, right, bottom, top = extent(beliefs.low, free.shape)
     axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[], xlabel="", ylabel="")
     return image

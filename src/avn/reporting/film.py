@@ -25,7 +25,7 @@ from avn.core.files import atomic_write
 from avn.modules.spectrogram import Spectrogram
 from avn.navigation.trace import BeliefTrace, Trace
 from avn.reporting.sound_figures import draw_plan
-from avn.reporting.trajectory_figures import draw_place, extent, outcome, plan_of, title_of
+from avn.reporting.trajectory_figures import draw_apartment, extent, outcome, plan_of, title_of
 
 # Frames per second. Only the cursor on the spectrograms moves within a second.
 FPS = 5
@@ -191,7 +191,7 @@ class _Stage:
             self.belief = axes.imshow(free[0], origin="lower", extent=place, alpha=0.75, **style)
         plan = plan_of(trace)
         if self.belief is None or plan is None:
-            draw_place(axes, trace)
+            draw_apartment(axes, trace.scene)
         else:
             draw_plan(axes, plan)
             for piece in plan.furniture:
@@ -201,7 +201,6 @@ class _Stage:
             for patch in axes.patches:
                 if patch.get_zorder() == 0:
                     patch.set_visible(False)
-            axes.plot(*trace.goal, "*", color="#ffb000", mec="black", markersize=17, zorder=12)
             axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
         centres = trace.scene.grid.centres
         (x0, y0), (x1, y1) = centres.min(0) - 1.2, centres.max(0) + 1.2
@@ -215,6 +214,8 @@ class _Stage:
             walk = centres[trace.exploration_trajectory // HEADINGS]
             axes.plot(*walk.T, color="0.45", lw=0.9, zorder=7)
             (self.recalled,) = axes.plot([], [], "o", color="#7b3294", ms=8, alpha=0.8, zorder=8)
+        star: dict[str, Any] = {"color": "#ffb000", "mec": "black", "markersize": 17}
+        (self.source,) = axes.plot([], [], "*", zorder=12, **star)
         (self.path,) = axes.plot([], [], color=_PATH, lw=2.6, zorder=9)
         (self.bumps,) = axes.plot([], [], "x", color="black", markersize=6, zorder=10)
         (self.agent,) = axes.plot([], [], color="white", mec=_PATH, mew=2.5, ms=18, zorder=11)
@@ -249,6 +250,7 @@ class _Stage:
         for ear, image in enumerate(self.sounds):
             image.set_data(self.pictures[step, ear])
         here = trace.path[step]
+        self.source.set_data(*trace.goals[step][:, None])
         self.path.set_data(*trace.path[: step + 1].T)
         self.bumps.set_data(*trace.path[: step + 1][trace.collided[: step + 1]].T)
         self.agent.set_data(*here[:, None])

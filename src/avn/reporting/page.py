@@ -255,7 +255,7 @@ def _episodes(run: PageRun) -> list[list[Any]]:
             int(row["actions"]),
             run.media.get(int(label)),
             place,
-            int(row["source_cell"]),
+            int(row.get("source_end_cell", row["source_cell"])),
             int(row["success"]),
             ":".join(str(row[key]) for key in _SAME),
         ]

@@ -85,7 +85,7 @@ def episode_media(trace: Trace, track: NDArray[np.float32], rate: int) -> dict[s
     return {
         "title": title_of(trace),
         "outcome": outcome(trace),
-        "goal": _rounded(trace.goal),
+        "goals": _rounded(trace.goals),
         "path": _rounded(np.concatenate((trace.path, heading), axis=1)),
         "action": trace.action.tolist(),
         "collided": trace.collided.astype(int).tolist(),

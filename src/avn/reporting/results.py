@@ -29,12 +29,14 @@ METRICS = {"sr": "success"} | {name: name for name in ("spl", "softspl", "sna", 
 INTERVALS = tuple(f"{metric}_{end}" for metric in METRICS for end in ("low", "high"))
 RESULT_COLUMNS = (*LABELS, "sound", "scene", "seed", "episodes", *METRICS, *INTERVALS)
 # Metrics of worlds that change in the course of an episode, and their columns of episodes.csv:
-# success after the sound has ended, Stop at the distractor (rates), and the error of the odometry
-# at the end in metres.
+# success after the sound has ended, Stop at the distractor (rates), the error of the odometry at
+# the end in metres, and dynamic SPL and the normalised distance to the goal of a moving source.
 DYNAMIC_METRICS = {
     "sws": "success_when_silent",
     "dsr": "stopped_at_distractor",
     "drift": "drift",
+    "dspl": "dspl",
+    "ndtg": "ndtg",
 }
 ALL_SOUNDS = "all"
 AVERAGE = "average"

@@ -33,9 +33,11 @@ def plan_of(trace: Trace) -> FloorPlan | None:
 
 
 def draw_place(axes: Axes, trace: Trace) -> None:
-    """Draw a trace's apartment in faint colours, in metres, and the source."""
+    """Draw a trace's apartment in faint colours, in metres, and the source at the end."""
     draw_apartment(axes, trace.scene)
-    axes.plot(*trace.goal, "*", zorder=12, **_SOURCE)
+    if (trace.goals != trace.goal).any():
+        axes.plot(*trace.goals.T, ":", color="#c98a1b", lw=1.5, zorder=6)
+    axes.plot(*trace.goals[-1], "*", zorder=12, **_SOURCE)
 
 
 def draw_apartment(axes: Axes, scene: NavigationScene) -> None:
@@ -208,8 +210,8 @@ def estimate_figure(trace: Trace, name: str, caption: str = "") -> Figure:
     )
     left.set_xlim(max(min(x0, low_x), x0 - 2), min(max(x1, high_x), x1 + 2))
     left.set_ylim(max(min(y0, low_y), y0 - 2), min(max(y1, high_y), y1 + 2))
-    error = np.linalg.norm(trace.source_estimates - trace.goal, axis=1)
-    away = np.linalg.norm(trace.path - trace.goal, axis=1)
+    error = np.linalg.norm(trace.source_estimates - trace.goals, axis=1)
+    away = np.linalg.norm(trace.path - trace.goals, axis=1)
     right.plot(steps, error, color="#1f6fb2", label="error of the source estimate")
     right.plot(steps, away, color="#777777", ls="--", label="distance from agent to source")
     right.set(xlabel="action", ylabel="metres", ylim=(0, None), xlim=(0, max(1, len(steps) - 1)))

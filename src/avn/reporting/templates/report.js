@@ -196,11 +196,11 @@
     const { plan, states } = read(`paths-${run}`)[place];
     const [scene, sound, number, metres, , , outcome, spl, actions] = data.runs[run].episodes[place];
     const cells = data.plans[plan].cells;
-    const goal = cells[data.runs[run].episodes[place][11]];
+    const goals = [cells[data.runs[run].episodes[place][11]]];
     const path = states.map((state) => [...cells[state >> 2], state & 3]);
     const end = `${outcome.replaceAll("_", " ")}, SPL ${spl.toFixed(2)}, ${actions} actions`;
     const title = `${scene}, ${sound}, episode ${number}: source ${metres.toFixed(1)} m away`;
-    return { run, plan, title, goal, path, outcome: end, source_estimates: null, belief: null, memory: null,
+    return { run, plan, title, goals, path, outcome: end, source_estimates: null, belief: null, memory: null,
       twins: [], media: null };
   }
 
@@ -281,7 +281,7 @@
       marks.push(svg("path", { d: "M-.2 0H.2M0-.2V.2", stroke: "#101820", "stroke-width": 0.11,
         transform: `translate(${hx} ${hy})`, id: "source-estimate" }));
     }
-    const [gx, gy] = spot(own.goal);
+    const [gx, gy] = spot(own.goals[Math.min(index, own.goals.length - 1)]);
     const star = [...Array(10).keys()].map((corner) => {
       const angle = Math.PI * corner / 5;
       const far = corner % 2 ? 0.1 : 0.25;
