@@ -6,7 +6,7 @@ known of the line of sight. A change of the map invalidates the squares whose pa
 squares; they are searched again from the others, as in dynamic shortest-path forests (Ramalingam
 and Reps, "An incremental algorithm for a generalization of the shortest-path problem", Journal of
 Algorithms 21, 1996). Of equally long paths, the repaired field has those of a complete search,
-whatever the order of the changes: see `_earlier`.
+whatever the order of the changes: see `field_ways`.
 """
 
 from __future__ import annotations
@@ -34,11 +34,9 @@ from avn.planning.field_state import (
     UNREACHED,
     WAITING,
 )
+from avn.planning.field_ways import RIGHT, UP, choose_ways, is_shut
 from avn.planning.sight import is_clear, shade
 
-# Columns and rows from a square to its neighbours.
-_RIGHT = np.array([-1, 0, 1, -1, 1, -1, 0, 1])
-_UP = np.array([-1, -1, -1, 0, 0, 1, 1, 1])
 # Neighbours to which a path goes on that came along each of the eight steps, and from the start:
 # the others are nearer to the square before.
 _ONWARD = np.array(
@@ -58,7 +56,15 @@ _ONWARD = np.array(
 
 @numba.njit(cache=True)
 def new_workspace(squares, reach):  # type: ignore[no-untyped-def]
-    """Return memory for searches on maps of so many squares with margin."""
+    """Return memory for searches.
+
+    Parameters
+    ----------
+    squares : int
+        W^2, squares of the map with its margin.
+    reach : int
+        Squares up to which paths are followed.
+    """
     levels = reach * STRAIGHT + LONGEST + 2
     return (
         np.full(levels, -1, dtype=np.int32),  # newest entry of the queue at each length
@@ -73,10 +79,22 @@ def new_workspace(squares, reach):  # type: ignore[no-untyped-def]
 def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type: ignore[no-untyped-def]
     """Repair a field after changes of the map, in place.
 
-    `field` is its length, direction and state, (W^2,) each. `steps` is (2, W^2) uint8: units of a
-    straight and of a diagonal step to each square, 0 if blocked. `changes` has twice the flat index
-    of each changed square, plus 1 if it has been blocked or freed. `aims` is the direction of
-    each offset from `start`, (2 M - 1, 2 M - 1).
+    Parameters
+    ----------
+    field : three (W^2,) arrays
+        Length, int16; direction, uint8; and state, uint8: see `field_state`.
+    steps : (2, W^2) uint8
+        Units of a straight and of a diagonal step to each square, 0 if it is blocked.
+    start : int
+        Flat index of the square from which the field is seen.
+    reach, bins : int
+        See `SoundFields`.
+    aims : (2 M - 1, 2 M - 1) uint8
+        Direction of each offset from the start, in rows and columns.
+    changes : (C,) int32
+        Twice the flat index of each changed square, plus 1 if it has been blocked or freed.
+    workspace : tuple of arrays
+        From `new_workspace`.
     """
     length, direction, state = field
     heads, entries, mark, listed, rows = workspace
@@ -121,12 +139,12 @@ def _invalidate(  # type: ignore[no-untyped-def]
             count += 1
         if change & 1:
             for k in (1, 3, 4, 6):
-                there = square + _UP[k] * width + _RIGHT[k]
+                there = square + UP[k] * width + RIGHT[k]
                 if steps[0, there] == 0 or there == start or mark[there] == INVALID:
                     continue
                 way = state[there] & FROM
                 # a freed square opens diagonal steps around it, a blocked one may close them
-                if steps[0, square] > 0 or (way < NOWHERE and _shut(steps, there, way, width)):
+                if steps[0, square] > 0 or (way < NOWHERE and is_shut(steps, there, way, width)):
                     mark[there], listed[count] = INVALID, there
                     count += 1
         if count > most:
@@ -137,7 +155,7 @@ def _invalidate(  # type: ignore[no-untyped-def]
         length[square], direction[square] = UNREACHED, bins
         state[square] = (state[square] & SIGHT) | NOWHERE
         for k in range(8):
-            there = square + _UP[k] * width + _RIGHT[k]
+            there = square + UP[k] * width + RIGHT[k]
             if state[there] & FROM == k and mark[there] != INVALID:
                 mark[there], listed[count] = INVALID, there
                 count += 1
@@ -145,15 +163,6 @@ def _invalidate(  # type: ignore[no-untyped-def]
             return -1
         i += 1
     return count
-
-
-@numba.njit(cache=True)
-def _shut(steps, square, way, width):  # type: ignore[no-untyped-def]
-    """Return whether a diagonal step to a square passes between two blocked ones."""
-    right, up = _RIGHT[way], _UP[way] * width
-    if right == 0 or up == 0:
-        return False
-    return steps[0, square - right] == 0 and steps[0, square - up] == 0
 
 
 @numba.njit(cache=True)
@@ -165,11 +174,11 @@ def _seed(length, steps, most, mark, invalid, heads, entries, width):  # type: i
             continue
         least = UNREACHED
         for k in range(8):
-            before = square - _UP[k] * width - _RIGHT[k]
+            before = square - UP[k] * width - RIGHT[k]
             if mark[before] != RESTING or length[before] > most:
                 continue
-            total = length[before] + steps[int(_RIGHT[k] != 0 and _UP[k] != 0), square]
-            if total < least and not _shut(steps, square, k, width):
+            total = length[before] + steps[int(RIGHT[k] != 0 and UP[k] != 0), square]
+            if total < least and not is_shut(steps, square, k, width):
                 least = total
         if least < UNREACHED:
             length[square], mark[square] = least, WAITING
@@ -188,7 +197,7 @@ def _search(  # type: ignore[no-untyped-def]
         first, heads[now] = heads[now], -1
         if first < 0:
             continue
-        _choose_ways(length, state, steps, now, most, mark, entries, first, width)
+        choose_ways(length, state, steps, now, most, mark, entries, first, width)
         _settle(
             length,
             direction,
@@ -211,22 +220,6 @@ def _search(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _choose_ways(length, state, steps, now, most, mark, entries, first, width):  # type: ignore[no-untyped-def]
-    """Choose the predecessors of squares of one length where several paths are as long."""
-    entry = first
-    while entry >= 0:
-        square, entry = entries[entry, 0], entries[entry, 1]
-        if length[square] != now or mark[square] != WAITING:
-            continue
-        way = _way(length, state, steps, square, now, most, width)
-        before = square - _UP[way] * width - _RIGHT[way]
-        if way == state[square] & FROM and mark[before] != CHANGED:
-            mark[square] = LOOKING
-        else:
-            mark[square], state[square] = KNOWN, (state[square] & (BENT | SIGHT)) | way
-
-
-@numba.njit(cache=True)
 def _settle(  # type: ignore[no-untyped-def]
     length, direction, state, steps, start, now, most, bins, aims, mark, entries, first, rows
 ):
@@ -240,7 +233,7 @@ def _settle(  # type: ignore[no-untyped-def]
             continue
         way, sight, aim, bent = old & FROM, old & SIGHT, bins, 0
         if now <= most and square != start:
-            before = square - _UP[way] * width - _RIGHT[way]
+            before = square - UP[way] * width - RIGHT[way]
             bent = state[before] & BENT
             if bent == 0 and sight == UNKNOWN:
                 sight = CLEAR_SIGHT if is_clear(steps, start, square, width) else DARK
@@ -271,26 +264,26 @@ def _spread(length, state, steps, now, most, mark, heads, entries, first, used, 
             k = _ONWARD[way, i]
             if k < 0:
                 break
-            there = square + _UP[k] * width + _RIGHT[k]
+            there = square + UP[k] * width + RIGHT[k]
             if news == TURNED:
                 total = int(length[there])
                 if state[there] & FROM != k or mark[there] != RESTING or total > most:
                     continue
                 mark[there] = LOOKING
             else:
-                diagonal = _RIGHT[k] * _UP[k] != 0
+                diagonal = RIGHT[k] * UP[k] != 0
                 step = steps[int(diagonal), there]
                 total = now + step
                 if step == 0 or total > length[there]:
                     continue
-                beside = square + _RIGHT[k], there - _RIGHT[k]
+                beside = square + RIGHT[k], there - RIGHT[k]
                 if diagonal and steps[0, beside[0]] == 0 and steps[0, beside[1]] == 0:
                     continue
                 waiting, old = mark[there], state[there] & FROM
                 if total < length[there]:
                     length[there], mark[there] = total, KNOWN
                     state[there] = (state[there] & SIGHT) | k
-                elif old == NOWHERE or length[there - _UP[old] * width - _RIGHT[old]] >= now:
+                elif old == NOWHERE or length[there - UP[old] * width - RIGHT[old]] >= now:
                     # as long as the path that is there: which one counts is known later
                     mark[there] = WAITING
                     if waiting != RESTING:
@@ -301,43 +294,3 @@ def _spread(length, state, steps, now, most, mark, heads, entries, first, used, 
             entries[used, 0], entries[used, 1], heads[total] = there, heads[total], used
             used += 1
     return used
-
-
-@numba.njit(cache=True)
-def _way(length, state, steps, square, now, most, width):  # type: ignore[no-untyped-def]
-    """Return the step by which the path arrives at a square: the first found by a whole search."""
-    best, found = -1, NOWHERE
-    for k in range(8):
-        before = square - _UP[k] * width - _RIGHT[k]
-        if length[before] > most:
-            continue
-        step = steps[int(_RIGHT[k] != 0 and _UP[k] != 0), square]
-        if length[before] + step != now or _shut(steps, square, k, width):
-            continue
-        if (
-            best < 0
-            or length[before] < length[best]
-            or (length[before] == length[best] and _earlier(length, state, before, best, width))
-        ):
-            best, found = before, k
-    return found
-
-
-@numba.njit(cache=True)
-def _earlier(length, state, one, other, width):  # type: ignore[no-untyped-def]
-    """Return whether a whole search comes to a square before another one of equal length.
-
-    A search that takes the newest entry of its queue first comes last to what it put there first:
-    of two squares, to the one whose predecessor it came to first, or is the earlier neighbour of
-    the same one.
-    """
-    flipped = False
-    while True:
-        a, b = state[one] & FROM, state[other] & FROM
-        one -= _UP[a] * width + _RIGHT[a]
-        other -= _UP[b] * width + _RIGHT[b]
-        if one == other:
-            return (a > b) != flipped
-        if length[one] != length[other]:
-            return (length[one] > length[other]) != flipped
-        flipped = not flipped

@@ -32,7 +32,7 @@ def likely(log_belief: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.exp(log_belief - np.where(np.isfinite(top), top, np.float32(0)))
 
 
-@numba.njit(cache=True, parallel=True)
+@numba.njit(cache=True)
 def best_around(belief, offsets):  # type: ignore[no-untyped-def]
     """Return the square with the greatest sum at some offsets, of those above 0: (R,) int64.
 
@@ -42,7 +42,7 @@ def best_around(belief, offsets):  # type: ignore[no-untyped-def]
     best = np.zeros(len(belief), dtype=np.int64)
     # with (0, 0) among the offsets the greatest sum is 1 or more, so one of its parts has a share
     share = np.float32(0.5 / len(offsets) if (np.abs(offsets).sum(1) == 0).any() else 0.0)
-    for n in numba.prange(len(belief)):
+    for n in range(len(belief)):
         own, most = belief[n], np.float32(0.0)
         hot = np.zeros(size, dtype=np.bool_)
         for y in range(size):

@@ -20,7 +20,17 @@ _ROUNDING = 1e-6
 
 @numba.njit(cache=True)
 def is_clear(steps, start, square, width):  # type: ignore[no-untyped-def]
-    """Return whether no square between two ones is blocked; see `field_search.repair`."""
+    """Return whether no square between two ones is blocked.
+
+    Parameters
+    ----------
+    steps : (2, W^2) uint8
+        Units of the steps to each square, 0 if it is blocked.
+    start, square : int
+        Flat indices of both.
+    width : int
+        W.
+    """
     x0, y0 = start % width, start // width
     x1, y1 = square % width, square // width
     dx, dy = abs(x1 - x0), abs(y1 - y0)
@@ -44,7 +54,31 @@ def is_clear(steps, start, square, width):  # type: ignore[no-untyped-def]
 def shade(steps, start, reach, width, state, changes, blocked, listed, count):  # type: ignore[no-untyped-def]
     """Note what squares hide that were blocked, or hide no more as they were freed.
 
-    List the squares of which this is news; return their number. See `field_search.repair`.
+    Parameters
+    ----------
+    steps : (2, W^2) uint8
+        Units of the steps to each square, 0 if it is blocked.
+    start : int
+        Flat index of the square from which is looked.
+    reach : int
+        Squares up to which is looked.
+    width : int
+        W.
+    state : (W^2,) uint8
+        States of the squares, changed in place.
+    changes : (C,) int32
+        See `field_search.repair`.
+    blocked : bool
+        Whether to look at the blocked squares or at the freed ones.
+    listed : (2 W^2,) int32
+        Gets the squares whose sight has changed.
+    count : int
+        How many there are already.
+
+    Returns
+    -------
+    int
+        How many there are now.
     """
     x0, y0 = start % width, start // width
     flips = np.empty((len(changes), 2), dtype=np.int64)
