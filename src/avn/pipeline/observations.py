@@ -248,7 +248,8 @@ class Observed:
         UserError
             For such an observation, or an entry of `agent.oracle_inputs` without any effect.
         """
-        check_told(self.cfg, agent, [name for name in wanted if not self.is_true(name)])
+        heard = [name for name in self.names if name in wanted and not self.is_true(name)]
+        check_told(self.cfg, agent, heard)
         for truth in self._truth:
             shown = [
                 name for name, observation in OBSERVATIONS.items() if observation.truth == truth
