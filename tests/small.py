@@ -60,6 +60,13 @@ A3C = (
 
 def composed(*overrides, command="eval", compose=compose):
     """The config of a command."""
+    # what a path leads to may change
+    make = _composed.__wrapped__ if any("/" in own for own in overrides) else _composed
+    return deepcopy(make(overrides, command, compose))
+
+
+@cache  # of equal overrides once a process, for the tests of a file have most of them in common
+def _composed(overrides, command, compose):
     GlobalHydra.instance().clear()
     registry.register()
     with initialize_config_dir(str(conf_folder().resolve()), version_base="1.3"):

@@ -6,13 +6,14 @@ import pandas as pd
 import pytest
 import soundfile
 import torch
-from small import SMALL, fitting
+from small import QUIET, SMALL, fitting
 
 
 @pytest.mark.parametrize("rate", [8000, 48000])
 def test_mini_is_trained_and_evaluated_at_it(command, outputs, rate):
     chosen = ("agent=greedy", f"acoustics.rate={rate}")
-    code, out, err = command("eval", *chosen, *fitting(chosen, *SMALL), f"outputs={outputs}")
+    settings = fitting(chosen, *SMALL, *QUIET)
+    code, out, err = command("eval", *chosen, *settings, f"outputs={outputs}")
     assert code == 0, err
     heard = pd.read_csv(Path(out[-1]) / "source_estimates.csv")
     assert (heard["error_m"] < 10).all()

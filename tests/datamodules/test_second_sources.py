@@ -57,6 +57,14 @@ def test_sounds_of_one_category_are_refused():
             second(0.4, known, categories)
 
 
+@pytest.mark.filterwarnings("error")
+def test_without_mixtures_one_category_is_enough():
+    told, source, sound = drawn(0.0, KNOWN, ["dog", "dog"])
+    assert (source == -1).all()
+    assert (sound == -1).all()
+    assert set(told.tolist()) == {0, 1}
+
+
 def test_the_mask_is_the_share_of_the_power():
     random = torch.Generator().manual_seed(0)
     first, other = torch.randn(2, 3, 2, 16000, generator=random)

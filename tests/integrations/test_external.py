@@ -134,6 +134,7 @@ def test_waveforms_are_what_the_sound_network_hears(outputs):
 
     overrides = ["split=mini", "processes=1", "acoustics.rays=300", "acoustics.seconds=0.2"]
     overrides += ["sound_model.epochs=1", f"outputs={outputs}", "algorithm.realisations=1"]
+    overrides += ["sound_model.validation_clips=100"]
     names = ["waveform", "spectrogram", "source_estimate"]
     env = avn.make_env(overrides, num_envs=8, observations=names, part="validation")
     cfg, _ = compose_command("eval", ["agent=external", *overrides])

@@ -1,5 +1,7 @@
 """A network that is told a category: what it is told matters, and nothing told masks nothing."""
 
+import math
+
 import pytest
 import torch
 from small import option
@@ -76,14 +78,14 @@ def test_the_loss_of_the_mask_counts_where_a_category_is_told():
     pictures, target = torch.randn(4, 4, 64, 64), torch.randn(4, 5)
     nothing, told = torch.zeros(4).long(), torch.tensor([0, 0, 1, 2])
     losses = []
-    for share in (0.0, 1.0):
+    for share, named in ((0.0, told), (1.0, told), (0.0, nothing)):
         mask = torch.full((4, 64, 8), share)
         batch = PictureBatch(
             pictures=pictures,
             target=target,
             in_sight=nothing.bool(),
             sound=nothing,
-            told=told,
+            told=named,
             mask=mask,
         )
         torch.manual_seed(1)
@@ -92,6 +94,7 @@ def test_the_loss_of_the_mask_counts_where_a_category_is_told():
     # the cross-entropies of 0 and of 1 differ by the log-odds
     expected = model.mask_weight * float(odds.detach().mean())
     assert losses[0] - losses[1] == pytest.approx(expected, rel=1e-3)
+    assert math.isfinite(losses[2]), "a batch in which nothing is told"
 
 
 @pytest.mark.parametrize(

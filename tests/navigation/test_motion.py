@@ -45,6 +45,10 @@ def test_it_goes_the_shortest_way_to_ends_that_are_drawn_uniformly():
     assert (np.abs(np.diff(found, axis=1)) == 1).all(), "it never waits with probability 1"
 
 
+def test_it_stays_where_there_is_no_other_square():
+    assert (walks(1.0, draw("one", "A").grid) == 0).all()
+
+
 def test_it_goes_everywhere():
     found = walks(1.0, actions=400)[:100]
     assert set(found.ravel()) == set(range(ROOMS.grid.cells))

@@ -16,6 +16,8 @@ SMALL = (
     "acoustics.rays=300",
     "acoustics.seconds=0.2",
     "sound_model.epochs=1",
+    "sound_model.validation_clips=100",
+    "logger=none",
     "realisations=1",
     "sound=alarm",
 )

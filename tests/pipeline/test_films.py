@@ -11,7 +11,8 @@ from small import SMALL, fitting
 def run(command, outputs, *more):
     # a run of greedy reads no renderer, but its films do
     own = [key for key in SMALL if key.startswith("renderer.") and any("film=" in o for o in more)]
-    settings = (*fitting("agent=greedy", *SMALL), *own, *more)
+    # an action is a second of film
+    settings = (*fitting("agent=greedy", *SMALL), "protocol.max_actions=20", *own, *more)
     return command("eval", "agent=greedy", *settings, f"outputs={outputs}")
 
 

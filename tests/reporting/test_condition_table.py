@@ -6,6 +6,7 @@ import pytest
 from made_runs import records
 
 from avn.reporting.condition_table import condition_cells, markdown
+from avn.reporting.results import DYNAMIC_METRICS
 
 
 @pytest.fixture
@@ -43,6 +44,26 @@ def test_the_text_keeps_the_order_and_leaves_missing_cells_empty(episodes):
     assert text[0] == "| condition | `greedy` | `belief` |"
     assert [line.split("|")[1].strip() for line in text[2:]] == ["`unheard`", "`heard`"]
     assert all(line.split("|")[2].strip() == "" for line in text[2:])
+
+
+def test_a_moving_source_has_dynamic_spl_and_the_distance_that_is_left(episodes):
+    moving = episodes["condition"] == "unheard"
+    episodes["dspl"] = (0.25 * episodes["success"]).where(moving)
+    episodes["ndtg"] = (1.0 - 0.9 * episodes["success"]).where(moving)
+    cells = condition_cells(episodes)
+    row = cells.set_index(["agent", "condition"]).loc[("belief", "unheard")]
+    assert row["dspl"] == pytest.approx(row["sr"] / 4)
+    assert row["ndtg"] == pytest.approx(100 - 0.9 * row["sr"])
+    lines = markdown(cells, ["heard", "unheard"], ["belief"]).splitlines()[2:]
+    assert "DSPL" not in lines[0]
+    assert f"DSPL, %: {row['dspl']:.1f}" in lines[1]
+    assert f"NDTG, %: {row['ndtg']:.1f}" in lines[1]
+
+
+def test_every_metric_of_a_changing_world_is_in_the_table(episodes):
+    for column in DYNAMIC_METRICS.values():
+        episodes[column] = 0.5
+    assert {*DYNAMIC_METRICS} <= {*condition_cells(episodes)}
 
 
 def test_a_condition_in_which_something_changes_has_further_lines(episodes):

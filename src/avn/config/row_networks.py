@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from avn.config.option_files import option_file
+from avn.core.errors import UserError
 
 
 def with_row_networks(arguments: Sequence[str]) -> list[str]:
@@ -20,8 +21,18 @@ def with_row_networks(arguments: Sequence[str]) -> list[str]:
     ----------
     arguments : sequence of str
         Overrides of `avn.train`.
+
+    Raises
+    ------
+    UserError
+        For several rows, of which each has its own network.
     """
     given = dict(argument.partition("=")[::2] for argument in arguments)
+    if "," in given.get("agent", "") and _overrides("model", given.get("model")):
+        raise UserError(
+            f"agent={given['agent']}: model={given['model']} has one network for all rows of a "
+            "sweep; train the rows one after another"
+        )
     row, model = (_overrides(group, given.get(group)) for group in ("agent", "model"))
     row = _overrides("mapper", given.get("mapper", row.get("mapper"))) | row
     added = [f"{group}={row[group]}" for group in row if group in model and group not in given]
@@ -34,10 +45,11 @@ def _overrides(group: str, option: str | None) -> dict[str, str]:
     path: Path | None = option_file(group, option) if option else None
     if path is None:
         return {}
-    defaults = (yaml.safe_load(path.read_text(encoding="utf-8")) or {}).get("defaults", [])
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    defaults = content.get("defaults") if isinstance(content, dict) else None
     return {
         key.removeprefix("override /").partition("@")[0]: value
-        for entry in defaults
+        for entry in defaults or []
         if isinstance(entry, dict)
         for key, value in entry.items()
         if key.startswith("override /") and not key.partition("@")[2].startswith("training.")

@@ -43,7 +43,7 @@ class SecondSources:
     Raises
     ------
     UserError
-        If the share is out of range, or there are no sounds of two categories, one of them known.
+        If there are second sources, but no sounds of two categories, one of them known.
     """
 
     def __init__(
@@ -112,9 +112,11 @@ class SecondSources:
         keys = scramble(self._key, item.numpy())
         told = self.told[sound]
         mixed = torch.from_numpy(uniform(keys, 2) < self.share) & (told > 0) & (sources > 1)
-        other = draw_second_source(
-            keys, source.numpy(), sound.numpy(), np.maximum(sources.numpy(), 2), self.categories
-        )
         named = mixed | torch.from_numpy(uniform(keys, 3) < _TOLD_ALONE)
-        other_source, other_sound = (torch.where(mixed, part, -1) for part in other)
+        other_source = other_sound = torch.full_like(told, -1)
+        if mixed.any():
+            other = draw_second_source(
+                keys, source.numpy(), sound.numpy(), np.maximum(sources.numpy(), 2), self.categories
+            )
+            other_source, other_sound = (torch.where(mixed, part, -1) for part in other)
         return torch.where(named, told, 0), other_source, other_sound

@@ -106,6 +106,8 @@ class ToldArrivalCnn(ArrivalCnn):
         loss = self.loss(self._net(pictures), target, batch["in_sight"])
         self.training_loss.update(loss.detach(), len(target))
         told = batch["told"] > 0
+        if not told.any():
+            return loss
         mask = nn.functional.binary_cross_entropy_with_logits(odds[told], batch["mask"][told])
         return loss + self.mask_weight * mask
 

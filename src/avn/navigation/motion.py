@@ -55,14 +55,14 @@ class Motion:
         found = np.empty((len(cells), actions + 1), dtype=np.int16)
         here = end = found[:, 0] = cells
         for number in range(actions):
-            others = np.uint64(grid.cells - 1)
+            others = np.uint64(max(grid.cells - 1, 1))
             away = 1 + (scramble(keys, 2 * number) % others).astype(np.int64)
             end = np.where(end == here, (here + away) % grid.cells, end)
             ahead = grid.neighbours[here]
             left = grid.distances[end[:, None], ahead] - grid.distances[end, here][:, None]
-            closer = ((ahead >= 0) & (left < 0)).argmax(axis=1)
-            steps = uniform(keys, 2 * number + 1) < self.step
-            here = np.where(steps, ahead[np.arange(len(here)), closer], here)
+            closer = (ahead >= 0) & (left < 0)
+            steps = (uniform(keys, 2 * number + 1) < self.step) & closer.any(axis=1)
+            here = np.where(steps, ahead[np.arange(len(here)), closer.argmax(axis=1)], here)
             found[:, number + 1] = here
         return found
 

@@ -23,7 +23,7 @@ def can_be_told(cfg: DictConfig) -> bool:
 
 
 def told_categories(cfg: DictConfig) -> Tensor:
-    """Return what the sound network is told of each sound, (sounds,) int64; see `ArrivalCnn`."""
+    """Return what a `ToldArrivalCnn` is told of each sound, (sounds,) int64."""
     known = list(cfg.sound_model.categories)
     return torch.tensor([known.index(name) + 1 for name in sound_categories(cfg).values()])
 

@@ -14,7 +14,13 @@ CONDITION = "condition"
 _ENDS = ("", "_low", "_high", "_network_std")
 _PERCENT = tuple(f"{metric}{end}" for metric in ("sr", "spl") for end in _ENDS)
 # Heading and factor of the metrics of conditions in which something changes in an episode.
-_DYNAMIC = {"sws": ("SWS, %", 100.0), "dsr": ("DSR, %", 100.0), "drift": ("drift, m", 1.0)}
+_DYNAMIC = {
+    "sws": ("SWS, %", 100.0),
+    "dsr": ("DSR, %", 100.0),
+    "drift": ("drift, m", 1.0),
+    "dspl": ("DSPL, %", 100.0),
+    "ndtg": ("NDTG, %", 100.0),
+}
 
 
 def condition_cells(episodes: pd.DataFrame) -> pd.DataFrame:
@@ -30,8 +36,9 @@ def condition_cells(episodes: pd.DataFrame) -> pd.DataFrame:
     DataFrame
         `agent`, `condition`, `protocol`, `acoustics`, `look`, `networks`, `episodes` of each
         network, and in %: `sr`, `spl`, their 95 % intervals over networks, apartments, sources and
-        episodes, and their standard deviations over networks. The same of `sws`, `dsr` (%) and
-        `drift` (metres) where a condition has them; see `avn.reporting.results.DYNAMIC_METRICS`.
+        episodes, and their standard deviations over networks. The same of `sws`, `dsr`,
+        `dspl`, `ndtg` (%) and `drift` (metres) where a condition has them; see
+        `avn.reporting.results.DYNAMIC_METRICS`.
     """
     rows = []
     for condition, own in episodes.groupby(CONDITION, sort=False):
