@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
+from heard_places import heard
 from torch import Tensor
 
 from avn.agents.base import Agent
+from avn.agents.belief_agent import BeliefAgent
 from avn.agents.planner_agent import PlannerAgent
 from avn.agents.recorder import Recorder
 from avn.agents.rollout import Labels, records, rollout
@@ -55,7 +57,11 @@ def simulator(scene: DrawnScene, source_estimates: Tensor | None = None) -> Simu
         "visual_embedding": torch.eye(4 * scene.grid.cells),  # every state looks like itself alone
     }
     observed = SceneObservations(
-        {"source_estimate": where if source_estimates is None else source_estimates}, visual
+        {
+            "source_estimate": where if source_estimates is None else source_estimates,
+            "arrival": heard(scene).expand(-1, -1, 1, TAKES, -1),
+        },
+        visual,
     )
     return Simulator(scene, frozen_episodes(scene, ["ring"], VAR, 0), VAR, observed)
 
@@ -63,6 +69,11 @@ def simulator(scene: DrawnScene, source_estimates: Tensor | None = None) -> Simu
 def ours(explores: bool = False, localisation: str = "retrieval+odometry") -> PlannerAgent:
     mapper = MemoryMapper(41, localisation=localisation) if explores else OccupancyMapper(41)
     return PlannerAgent(mapper)
+
+
+def hearing() -> BeliefAgent:
+    """Return an agent with a posterior of the source."""
+    return BeliefAgent(OccupancyMapper(41), obstacle_threshold=0.01)
 
 
 def walked(agent: Agent, rows: Sequence[int] = tuple(range(6))) -> list[Trace]:

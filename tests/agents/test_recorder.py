@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import torch
-from drawn_walks import TAKES, flat, ours, simulator, walked
+from drawn_walks import TAKES, flat, hearing, ours, simulator, walked
 from tensordict import TensorDict
 from torch import Tensor
 
@@ -80,6 +80,21 @@ def test_beliefs_lie_where_the_apartment_lies(explores: bool, localisation: str)
         if localisation != "retrieval":
             np.testing.assert_allclose(beliefs.pose[:, :2], trace.path[:-1])
             assert (beliefs.pose[:, 2] == trace.state[:-1] % 4).all()
+
+
+def test_the_posterior_comes_to_lie_on_the_source() -> None:
+    for trace in walked(hearing()):
+        beliefs = trace.beliefs
+        assert beliefs is not None
+        assert beliefs.posterior is not None
+        assert beliefs.posterior.shape == beliefs.free.shape
+        assert beliefs.posterior[-1].max() == 255  # at first it may lie outside the apartment
+        y, x = np.unravel_index(beliefs.posterior[-1].argmax(), beliefs.posterior.shape[1:])
+        source = trace.scene.grid.lattice[trace.scene.sources[trace.source]] - beliefs.low
+        assert np.abs(source - (x, y)).max() <= 1
+    plain = walked(ours(), [0])[0].beliefs
+    assert plain is not None
+    assert plain.posterior is None
 
 
 def test_the_memory_returns_the_very_place_where_it_was_before() -> None:

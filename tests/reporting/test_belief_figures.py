@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from drawn_walks import ours, walked
+from drawn_walks import hearing, ours, walked
 
 from avn.agents.greedy import Greedy
 from avn.reporting.belief_figures import PANELS, belief_figure, memory_figure
@@ -37,6 +37,22 @@ def test_the_memory_is_drawn_with_its_walk_and_what_it_returned() -> None:
         lines["most similar entry"].get_xydata(), trace.beliefs.retrieved[:, 0, :2]
     )
     assert (right.lines[1].get_ydata() == 0).all()  # odometry does not lie here
+
+
+def test_dots_are_on_their_squares_with_the_area_of_the_probability() -> None:
+    trace = max(walked(hearing()), key=lambda own: len(own.action))
+    beliefs = trace.beliefs
+    assert beliefs is not None
+    assert beliefs.posterior is not None
+    figure = belief_figure(trace, "belief")
+    last = [axes for axes in figure.axes if axes.images][-1]
+    dots = last.collections[-1]
+    shares = beliefs.posterior[-1] / 255
+    np.testing.assert_allclose(dots.get_sizes(), dots.get_sizes().max() * shares.ravel())
+    y, x = np.unravel_index(shares.argmax(), shares.shape)
+    place = dots.get_offsets()[shares.argmax()]
+    np.testing.assert_allclose(place, 0.5 * (beliefs.low + np.array([x, y])))
+    assert "where the source may be" in figure.legends[0].get_texts()[-1].get_text()
 
 
 def test_agents_without_maps_have_no_such_pictures() -> None:

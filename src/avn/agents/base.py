@@ -70,6 +70,22 @@ class Agent(ABC):
         """
         return
 
+    def posterior(self, rows: Tensor) -> Tensor | None:
+        """Return what it believes about the position of the source, for films and figures.
+
+        Parameters
+        ----------
+        rows : (R,) int64 tensor
+            Episodes.
+
+        Returns
+        -------
+        (R, M, M) float32 tensor, or None
+            Probability of each square of its map, divided by that of the likeliest one; None if it
+            keeps no posterior.
+        """
+        return None
+
     def set_active(self, active: Tensor) -> None:
         """Set which episodes are not over, (N,) bool, to save work on the others."""
         return

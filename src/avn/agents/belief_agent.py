@@ -18,6 +18,7 @@ from avn.core.heard import Arrivals
 from avn.mapping.base import Mapper
 from avn.navigation.protocols import Protocol
 from avn.planning.arrival_belief import ArrivalBelief
+from avn.planning.posterior import likely
 from avn.planning.settings import ArrivalModel
 
 if TYPE_CHECKING:
@@ -116,6 +117,12 @@ class BeliefAgent(PlannerAgent):
         self._belief: ArrivalBelief | None = None
         self._actions, self._silent = 0, np.zeros(n, dtype=np.int64)
         self._goal = goal_offsets(protocol)
+
+    def posterior(self, rows: Tensor) -> Tensor | None:
+        """Return the posterior of the source. See `Agent.posterior`."""
+        if self._belief is None:
+            return None
+        return torch.from_numpy(likely(self._belief.log_belief[rows.numpy()]))
 
     def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
         heard = Arrivals(observation["arrival"].float())

@@ -64,6 +64,8 @@ class Recorder:
             mapper = getattr(agent, "mapper", None)
             if self._keeps_beliefs and isinstance(mapper, Mapper):
                 step |= self._beliefs(simulator, mapper, rows)
+                if (posterior := agent.posterior(rows)) is not None:
+                    step["posterior"] = self._frames[scene].squares(posterior, outside=0.0)
         self._steps.setdefault(scene, []).append({key: x.clone() for key, x in step.items()})
         return bool(simulator.done[rows].all())
 
@@ -117,7 +119,7 @@ class Recorder:
             estimate = simulator.scene.grid.centres[state // HEADINGS] + offsets.numpy()
         beliefs = None
         if pose is not None:
-            own = [stacked(key, count) for key in ("free", "similarity", "retrieved")]
+            own = [stacked(key, count) for key in ("free", "posterior", "similarity", "retrieved")]
             beliefs = BeliefTrace(pose, self._frames[scene].low, *own)
         draws = simulator.protocol.max_actions + 1
         # draws of this episode alone, since a scene may have thousands
@@ -178,10 +180,10 @@ class _Frames:
         heading = (mapper.pose[rows, 2] + self._heading) % HEADINGS
         return torch.cat((CELL * (self._origin + away), heading[:, None].double()), dim=1)
 
-    def squares(self, belief: Tensor) -> Tensor:
+    def squares(self, belief: Tensor, outside: float = 0.5) -> Tensor:
         """Resample beliefs (R, M, M) to the squares of the apartment, (R, H, W) uint8."""
         found = belief.flatten(1).gather(1, self._index.flatten(1)).view(self._index.shape)
-        return (255 * torch.where(self._inside, found, 0.5)).round().to(torch.uint8)
+        return (255 * torch.where(self._inside, found, outside)).round().to(torch.uint8)
 
     def entries(self, places: Tensor) -> Tensor:
         """Return memory entries (R, k, 3) as metres east, metres north and heading, float64."""

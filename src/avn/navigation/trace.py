@@ -26,6 +26,9 @@ class BeliefTrace:
         Lattice indices (x, y) of the first square of `free`.
     free : (T, H, W) uint8, or None
         Probability that each square is free, scaled to 0 to 255, by y and x; 128 is unknown.
+    posterior : (T, H, W) uint8, or None
+        Probability that each square has the source, scaled so that the likeliest one of its map
+        has 255.
     similarity : (T, k) float32, or None
         Cosine similarity of the view and the entries that the spatial memory returned.
     retrieved : (T, k, 3) float64, or None
@@ -35,6 +38,7 @@ class BeliefTrace:
     pose: NDArray[np.float64]
     low: NDArray[np.int64]
     free: NDArray[np.uint8] | None
+    posterior: NDArray[np.uint8] | None
     similarity: NDArray[np.float32] | None
     retrieved: NDArray[np.float64] | None
 

@@ -6,9 +6,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
+from avn.apartments.floor_plan import CELL
 from avn.core.actions import HEADINGS
 from avn.navigation.trace import BeliefTrace, Trace
 from avn.reporting.sound_figures import draw_plan
@@ -30,6 +33,9 @@ PANELS = 6
 _STAR: dict[str, Any] = {"color": "#ffb000", "mec": "black", "mew": 0.8}
 # Colour of the path, distinct from all colours of the belief.
 WALKED = "#e0218a"
+# Colour of what is believed about the source, and area of the dot of the likeliest square.
+SOURCE = "#1f6fb2"
+_LIKELIEST = 60.0
 
 
 def belief_figure(trace: Trace, name: str, caption: str = "") -> Figure:
@@ -62,9 +68,10 @@ def belief_figure(trace: Trace, name: str, caption: str = "") -> Figure:
         axes.set_title(f"before action {step + 1}", fontsize=9)
     bar = figure.colorbar(image, ax=list(panels), fraction=0.025, pad=0.01)
     bar.set_label("belief that a square is free")
+    marks = (trace.source_estimates is not None, beliefs.posterior is not None)
     figure.suptitle(wrapped(f"{name}: {title_of(trace)}; {outcome(trace)}", 110), fontsize=10)
     figure.legend(
-        handles=_belief_handles(trace.source_estimates is not None),
+        handles=_belief_handles(*marks),
         loc="outside lower left",
         ncols=4,
         frameon=False,
@@ -73,7 +80,7 @@ def belief_figure(trace: Trace, name: str, caption: str = "") -> Figure:
     return figure
 
 
-def _belief_handles(estimate: bool) -> list[Line2D]:
+def _belief_handles(estimate: bool, posterior: bool) -> list[Line2D]:
     """Return the legend of the marks on a belief."""
     ring: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": WALKED, "mew": 2, "markersize": 7}
     handles = [
@@ -82,8 +89,12 @@ def _belief_handles(estimate: bool) -> list[Line2D]:
         Line2D([], [], linestyle="none", marker="*", markersize=12, label="source", **_STAR),
     ]
     if estimate:
-        cross: dict[str, Any] = {"marker": "P", "color": "#1f6fb2", "mec": "white", "markersize": 9}
+        cross: dict[str, Any] = {"marker": "P", "color": SOURCE, "mec": "white", "markersize": 9}
         handles.append(Line2D([], [], linestyle="none", label="source estimate", **cross))
+    if posterior:
+        dot: dict[str, Any] = {"marker": "o", "color": SOURCE, "mew": 0, "markersize": 6}
+        label = "where the source may be, area as the probability"
+        handles.append(Line2D([], [], linestyle="none", label=label, **dot))
     return handles
 
 
@@ -119,6 +130,8 @@ def draw_belief(axes: Axes, trace: Trace, beliefs: BeliefTrace, step: int) -> An
         for patch in axes.patches:  # furniture, which would hide the belief
             if patch.get_zorder() == 0:
                 patch.set_visible(False)
+    if beliefs.posterior is not None:
+        draw_posterior(axes, beliefs, step)
     path = trace.path[: step + 1]
     axes.plot(*path.T, color=WALKED, lw=2, zorder=5)
     front = FRONT[trace.state[step] % HEADINGS]
@@ -126,7 +139,7 @@ def draw_belief(axes: Axes, trace: Trace, beliefs: BeliefTrace, step: int) -> An
     axes.plot(*path[-1], "o", color="white", mec=WALKED, mew=2, markersize=7, zorder=6)
     if trace.source_estimates is not None:
         axes.plot(
-            *trace.source_estimates[step], "P", color="#1f6fb2", mec="white", markersize=9, zorder=7
+            *trace.source_estimates[step], "P", color=SOURCE, mec="white", markersize=9, zorder=7
         )
     axes.plot(
         *trace.goals[step], "*", color="#ffb000", mec="black", mew=0.8, markersize=12, zorder=7
@@ -134,6 +147,36 @@ def draw_belief(axes: Axes, trace: Trace, beliefs: BeliefTrace, step: int) -> An
     left, right, bottom, top = extent(beliefs.low, free.shape)
     axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[], xlabel="", ylabel="")
     return image
+
+
+def draw_posterior(axes: Axes, beliefs: BeliefTrace, step: int) -> PathCollection:
+    """Draw the posterior of the source at one step, as dots on the squares.
+
+    Parameters
+    ----------
+    axes : Axes
+    beliefs : BeliefTrace
+        With a posterior.
+    step : int
+
+    Returns
+    -------
+    PathCollection
+        The dots of all squares, by y and x. Their areas are as `posterior_areas` gives them.
+    """
+    assert beliefs.posterior is not None
+    height, width = beliefs.posterior.shape[1:]
+    x, y = np.meshgrid(
+        *(CELL * (low + np.arange(n)) for low, n in zip(beliefs.low, (width, height), strict=True))
+    )
+    areas = posterior_areas(beliefs, step)
+    return axes.scatter(x.ravel(), y.ravel(), s=areas, color=SOURCE, linewidths=0, zorder=6)
+
+
+def posterior_areas(beliefs: BeliefTrace, step: int) -> NDArray[np.float64]:
+    """Return the area of the dot of each square in points squared, as its probability."""
+    assert beliefs.posterior is not None
+    return _LIKELIEST * beliefs.posterior[step].ravel() / 255.0
 
 
 def memory_figure(trace: Trace, name: str, caption: str = "") -> Figure:

@@ -24,6 +24,7 @@ from avn.core.errors import UserError
 from avn.core.files import atomic_write
 from avn.modules.spectrogram import Spectrogram
 from avn.navigation.trace import BeliefTrace, Trace
+from avn.reporting.belief_figures import draw_posterior, posterior_areas
 from avn.reporting.sound_figures import draw_plan
 from avn.reporting.trajectory_figures import draw_apartment, extent, outcome, plan_of, title_of
 
@@ -189,6 +190,9 @@ class _Stage:
             style: dict[str, Any] = {"cmap": "BrBG", "vmin": 0, "vmax": 255, "zorder": -1}
             place = extent(beliefs.low, free.shape[1:])
             self.belief = axes.imshow(free[0], origin="lower", extent=place, alpha=0.75, **style)
+        self.posterior = None
+        if beliefs is not None and beliefs.posterior is not None:
+            self.posterior = draw_posterior(axes, beliefs, 0)
         plan = plan_of(trace)
         if self.belief is None or plan is None:
             draw_apartment(axes, trace.scene)
@@ -233,6 +237,8 @@ class _Stage:
         second = []
         if self.belief is not None:
             second.append("belief: green free, brown blocked")
+        if self.posterior is not None:
+            second.append("blue dots: where the source may be, area as the probability")
         if self.recalled is not None:
             second.append("memory: grey exploration walk, purple most similar entries")
         for height, line in ((40, words), (24, second)):
@@ -269,6 +275,8 @@ class _Stage:
         """Show the agent's beliefs at the time of its action."""
         if self.belief is not None and beliefs.free is not None:
             self.belief.set_data(beliefs.free[step])
+        if self.posterior is not None:
+            self.posterior.set_sizes(posterior_areas(beliefs, step))
         if self.recalled is not None and beliefs.retrieved is not None:
             self.recalled.set_data(*beliefs.retrieved[step, :, :2].T)
 
