@@ -85,7 +85,9 @@ def test_settings_without_effect_are_named():
     assert not {"stop_by", "confirm"} & set(agent.unused_settings(STOP))
     other = BeliefAgent(OccupancyMapper(SIZE), stop_by="classifier")
     assert "stop_above" in other.unused_settings(STOP)
-    assert dataclasses.asdict(agent.model) == dataclasses.asdict(ArrivalModel())
+    assert agent.model == ArrivalModel(shared_by_headings=0)
+    around = BeliefAgent(OccupancyMapper(SIZE), look="around")
+    assert around.model == ArrivalModel(shared_by_headings=1), "all squares have four headings"
     with pytest.raises(UserError, match=r"planner\.stop_by: 'luck'"):
         BeliefAgent(OccupancyMapper(SIZE), stop_by="luck")
     with pytest.raises(UserError, match=r"planner\.stop_above: 0"):

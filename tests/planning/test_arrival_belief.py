@@ -67,6 +67,25 @@ def test_two_bearings_cross_at_the_source():
     assert abs(found[1] - 18) <= 2
 
 
+def test_headings_that_share_their_errors_count_as_their_mean():
+    source, here = (20, 17), (12, 12)
+    turned = [(*here, heading) for heading in range(4)]
+    one = walk(rooms(), turned[:1], source, ArrivalModel(shared_by_headings=1)).log_belief
+    mean = walk(rooms(), turned, source, ArrivalModel(shared_by_headings=1)).log_belief
+    half = walk(rooms(), turned, source, ArrivalModel(shared_by_headings=0.5)).log_belief
+    whole = walk(rooms(), turned, source, ArrivalModel(shared_by_headings=0)).log_belief
+    plain = walk(rooms(), turned, source, ArrivalModel()).log_belief
+    known = np.isfinite(one)
+    np.testing.assert_allclose(mean[known], one[known], rtol=1e-4)
+    np.testing.assert_array_equal(whole, plain)
+    # exact headings agree: four times and twice the evidence about the direction
+    same = ArrivalModel(shared_by_headings=1, bearing_weight=0)
+    length = walk(rooms(), turned, source, same).log_belief
+    mean, half, whole = ((own - length)[known] for own in (mean, half, whole))
+    np.testing.assert_allclose(whole, 4 * mean, rtol=1e-3)
+    np.testing.assert_allclose(half, 2 * mean, rtol=1e-3)
+
+
 def test_evidence_is_scored_again_when_the_map_changes():
     open_map = np.ones((1, SIZE, SIZE), np.float32)
     belief = walk(open_map, [(20, 5, 0)], (20, 25))

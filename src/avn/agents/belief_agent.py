@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,6 +83,9 @@ class BeliefAgent(PlannerAgent):
         if not 0 < stop_above <= 1:
             raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and up to 1")
         self.model, self.stop_by, self.stop_above = model or ArrivalModel(), stop_by, stop_above
+        if self.model.shared_by_headings is None:
+            shared = 1.0 if self.look == "around" else 0.0
+            self.model = replace(self.model, shared_by_headings=shared)
         if target not in TARGETS:
             raise UserError(f"planner.target: '{target}' is none of {', '.join(TARGETS)}")
         self.target = target

@@ -68,6 +68,10 @@ class ArrivalModel:
         Share of the weight of evidence that is kept with each square walked, 0 to 1.
     bearing_weight, distance_weight : float
         Factors of the two terms, 0 to 100; below 1 because errors of nearby places are correlated.
+    shared_by_headings : float or None
+        Part of the evidence about the direction that the headings of a square share, 0 to 1: k
+        headings count as k to the power of 1 - this, so at 1 as their mean. None is 0 with
+        `look=once` and 1 with `look=around`, where all squares have four.
     blur : float
         Share of a uniform distribution in that of the direction, more than 0 and below 1.
     least_sigma : float
@@ -89,6 +93,7 @@ class ArrivalModel:
     kept: float = 0.7
     bearing_weight: float = 1.0
     distance_weight: float = 1.0
+    shared_by_headings: float | None = None
     blur: float = 0.1
     least_sigma: float = 0.1
     bias: float = 0.0
@@ -101,13 +106,13 @@ class ArrivalModel:
             "kept": (0, 1),
             "bearing_weight": (0, 100),
             "distance_weight": (0, 100),
+            "shared_by_headings": (0, 1),
             "blur": (1e-6, 0.999),
             "least_sigma": (1e-3, 10),
             "bias": (0, 10),
             "reach": (1, 1000),
         }
         for key, (least, most) in limits.items():
-            if not least <= getattr(self, key) <= most:
-                raise UserError(
-                    f"planner.model.{key}: {getattr(self, key)}; give {least} to {most}"
-                )
+            value = getattr(self, key)
+            if value is not None and not least <= value <= most:
+                raise UserError(f"planner.model.{key}: {value}; give {least} to {most}")
