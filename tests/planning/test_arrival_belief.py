@@ -81,7 +81,7 @@ def test_headings_that_share_their_errors_count_as_their_mean():
     # exact headings agree: four times and twice the evidence about the direction
     same = ArrivalModel(shared_by_headings=1, bearing_weight=0)
     length = walk(rooms(), turned, source, same).log_belief
-    mean, half, whole = ((own - length)[known] for own in (mean, half, whole))
+    mean, half, whole = (own[known] - length[known] for own in (mean, half, whole))
     np.testing.assert_allclose(whole, 4 * mean, rtol=1e-3)
     np.testing.assert_allclose(half, 2 * mean, rtol=1e-3)
 
