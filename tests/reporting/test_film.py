@@ -1,17 +1,18 @@
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from drawn_walks import clips, ours, views, walked
+from drawn_walks import clips, hearing, ours, views, walked
 
 from avn.agents.random_walk import RandomWalk
 from avn.core.errors import UserError
 from avn.navigation.trace import Trace
 from avn.pipeline.observed import soundtrack
-from avn.reporting.film import FPS, SIZE, write_film
+from avn.reporting.film import FPS, SIZE, frames, write_film
 
 
 def shown(path: Path) -> np.ndarray:
@@ -54,6 +55,19 @@ def test_a_film_has_a_second_for_each_step_and_two_ears(tmp_path: Path) -> None:
     # the cursor moves within a second, and the agent between seconds
     assert (pictures[0] != pictures[2]).any()
     assert not list(tmp_path.glob(".*"))
+
+
+def test_the_posterior_is_on_the_map_at_each_step() -> None:
+    trace = min(walked(hearing()), key=lambda own: len(own.action))
+    assert trace.beliefs is not None
+    plain = replace(trace, beliefs=replace(trace.beliefs, posterior=None))
+    dots, none = (
+        np.stack([*frames(own, "belief", views(own), clips(own))])[::FPS, 110:640, 490:].astype(int)
+        for own in (trace, plain)
+    )
+    changed = np.abs(dots - none).any(-1)
+    assert changed.any((1, 2)).all()
+    assert (changed[0] != changed[-1]).any(), "the dots move"
 
 
 def test_an_agent_without_ears_or_map_is_filmed_too(tmp_path: Path) -> None:

@@ -146,8 +146,8 @@ class ArrivalBelief(Searched):
         terms = np.log((1 - model.blur) * np.exp(mean) + model.blur / self.bins)
         summed = (terms * (count > 0)[..., None]).sum(1)
         headings = (count > 0).sum(1).astype(np.float32)
-        once = headings ** -np.float32(model.shared_by_headings or 0.0)
-        terms = model.bearing_weight * (once * self._weight[row, slot])[:, None] * summed
+        part = headings ** -np.float32(model.shared_by_headings or 0.0)
+        terms = model.bearing_weight * (part * self._weight[row, slot])[:, None] * summed
         # beyond the reach is less likely than the least likely direction
         return np.concatenate((terms, terms.min(1, keepdims=True) - 5), 1)
 

@@ -36,6 +36,8 @@ WALKED = "#e0218a"
 # Colour of what is believed about the source, and area of the dot of the likeliest square.
 SOURCE = "#1f6fb2"
 _LIKELIEST = 60.0
+# What the dots of a posterior are, for legends.
+DOTS = "where the source may be, area as the probability"
 
 
 def belief_figure(trace: Trace, name: str, caption: str = "") -> Figure:
@@ -68,10 +70,9 @@ def belief_figure(trace: Trace, name: str, caption: str = "") -> Figure:
         axes.set_title(f"before action {step + 1}", fontsize=9)
     bar = figure.colorbar(image, ax=list(panels), fraction=0.025, pad=0.01)
     bar.set_label("belief that a square is free")
-    marks = (trace.source_estimates is not None, beliefs.posterior is not None)
     figure.suptitle(wrapped(f"{name}: {title_of(trace)}; {outcome(trace)}", 110), fontsize=10)
     figure.legend(
-        handles=_belief_handles(*marks),
+        handles=_belief_handles(trace.source_estimates is not None, beliefs.posterior is not None),
         loc="outside lower left",
         ncols=4,
         frameon=False,
@@ -93,8 +94,7 @@ def _belief_handles(estimate: bool, posterior: bool) -> list[Line2D]:
         handles.append(Line2D([], [], linestyle="none", label="source estimate", **cross))
     if posterior:
         dot: dict[str, Any] = {"marker": "o", "color": SOURCE, "mew": 0, "markersize": 6}
-        label = "where the source may be, area as the probability"
-        handles.append(Line2D([], [], linestyle="none", label=label, **dot))
+        handles.append(Line2D([], [], linestyle="none", label=DOTS, **dot))
     return handles
 
 

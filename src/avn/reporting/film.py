@@ -24,7 +24,7 @@ from avn.core.errors import UserError
 from avn.core.files import atomic_write
 from avn.modules.spectrogram import Spectrogram
 from avn.navigation.trace import BeliefTrace, Trace
-from avn.reporting.belief_figures import draw_posterior, posterior_areas
+from avn.reporting.belief_figures import DOTS, SOURCE, WALKED, draw_posterior, posterior_areas
 from avn.reporting.sound_figures import draw_plan
 from avn.reporting.trajectory_figures import draw_apartment, extent, outcome, plan_of, title_of
 
@@ -32,7 +32,6 @@ from avn.reporting.trajectory_figures import draw_apartment, extent, outcome, pl
 FPS = 5
 SIZE = (1280, 720)
 ACTIONS = ("forward", "backward", "turn left", "turn right", "Stop")
-_PATH, _ESTIMATE = "#e0218a", "#1f6fb2"
 
 
 def write_film(
@@ -220,12 +219,12 @@ class _Stage:
             (self.recalled,) = axes.plot([], [], "o", color="#7b3294", ms=8, alpha=0.8, zorder=8)
         star: dict[str, Any] = {"color": "#ffb000", "mec": "black", "markersize": 17}
         (self.source,) = axes.plot([], [], "*", zorder=12, **star)
-        (self.path,) = axes.plot([], [], color=_PATH, lw=2.6, zorder=9)
+        (self.path,) = axes.plot([], [], color=WALKED, lw=2.6, zorder=9)
         (self.bumps,) = axes.plot([], [], "x", color="black", markersize=6, zorder=10)
-        (self.agent,) = axes.plot([], [], color="white", mec=_PATH, mew=2.5, ms=18, zorder=11)
-        (self.ray,) = axes.plot([], [], color=_ESTIMATE, lw=1, ls=":", zorder=8)
+        (self.agent,) = axes.plot([], [], color="white", mec=WALKED, mew=2.5, ms=18, zorder=11)
+        (self.ray,) = axes.plot([], [], color=SOURCE, lw=1, ls=":", zorder=8)
         (self.estimate,) = axes.plot(
-            [], [], "P", color=_ESTIMATE, mec="white", markersize=14, zorder=13
+            [], [], "P", color=SOURCE, mec="white", markersize=14, zorder=13
         )
 
     def _legend(self) -> None:
@@ -238,7 +237,7 @@ class _Stage:
         if self.belief is not None:
             second.append("belief: green free, brown blocked")
         if self.posterior is not None:
-            second.append("blue dots: where the source may be, area as the probability")
+            second.append(f"blue dots: {DOTS}")
         if self.recalled is not None:
             second.append("memory: grey exploration walk, purple most similar entries")
         for height, line in ((40, words), (24, second)):
