@@ -14,7 +14,7 @@ from avn.apartments.floor_plan import FloorPlan, from_dict
 from avn.apartments.generator import generate
 from avn.apartments.grid import build_grid
 from avn.apartments.settings import SplitConfig
-from avn.apartments.splits import FROZEN, PARTS, load_split, part_of_layout
+from avn.apartments.splits import FROZEN, PARTS, load_split, more_training, part_of_layout
 from avn.apartments.symmetry import Key, layout_key
 from avn.core.errors import UserError
 from avn.core.random import derive
@@ -229,3 +229,20 @@ def test_a_folder_without_floor_plans_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("none yet")
     with pytest.raises(UserError, match=r"split\.folder: no floor plan in .*; add one"):
         load_split(SplitConfig(folder=str(tmp_path)))
+
+
+def test_generated_training_apartments_are_those_of_procedural() -> None:
+    few, more = more_training(config("var"), 1), more_training(config("var"), 2)
+    drawn = load_split(replace(config("procedural"), train=2))["train"]
+    assert few == drawn[:1]
+    assert more == drawn
+    assert more_training(config("procedural"), 0) == []
+    frozen = {layout_key(plan) for plans in load_split(config("var")).values() for plan in plans}
+    assert not frozen & {layout_key(plan) for plan in drawn}
+
+
+def test_generated_training_apartments_of_a_wrong_number_or_split_are_refused() -> None:
+    with pytest.raises(UserError, match=r"training\.generated: -1; give 0 or more"):
+        more_training(config("var"), -1)
+    with pytest.raises(UserError, match=r"'procedural' is generated itself; give 0, and more"):
+        more_training(config("procedural"), 1)

@@ -9,8 +9,9 @@ from small import composed
 
 from avn.apartments.splits import FROZEN
 from avn.core.errors import UserError
-from avn.pipeline.apartments import TRAINING, Apartments, apartments_of_all_subsets
+from avn.pipeline.apartments import TEST, TRAINING, Apartments, apartments_of_all_subsets, plan_hash
 from avn.pipeline.export import stages_of
+from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.scenes import DirectSound, Geometry, LateReverberation
 from avn.pipeline.stage import build, missing
 from avn.pipeline.views import RenderedViews
@@ -29,6 +30,31 @@ def test_a_part_without_apartments_is_named_where_it_is_needed(tmp_path):
         Apartments(cfg, "train").plans  # noqa: B018
     with pytest.raises(UserError, match=r"training\.scenes\.train is empty.*training\.scenes=var"):
         Apartments(cfg, "train", TRAINING).plans  # noqa: B018
+
+
+def test_networks_of_some_rows_train_on_generated_apartments_too():
+    one = Apartments(composed("split=mini", "training.generated=1"), "train", TRAINING)
+    assert [plan.name for plan in one.plans] == ["train_1", "train_1"]
+    assert len(set(map(plan_hash, one.plans))) == 2
+    assert "training.generated" in one.keys
+    # neither the validation apartments nor the test world have them
+    for subset, world in (("validation", TRAINING), ("train", TEST)):
+        assert len(Apartments(one.cfg, subset, world).plans) == 1
+    counts = {
+        "agent=belief": 8,
+        "agent=plan_noexp": 0,
+        "agent=belief split=mini": 0,
+        "agent=belief split=procedural": 0,
+        "agent=belief training.generated=3": 3,
+    }
+    for given, count in counts.items():
+        assert composed(*given.split()).training.generated == count
+
+
+def test_networks_of_other_training_apartments_are_other_networks():
+    base, more = ("split=mini", "occupancy_model=small"), "training.generated=1"
+    alone, both = (OccupancyNetwork(composed(*own)) for own in (base, (*base, more)))
+    assert alone.fingerprint != both.fingerprint
 
 
 def test_views_of_an_apartment_without_light_are_refused(tmp_path):

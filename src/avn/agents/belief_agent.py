@@ -141,12 +141,19 @@ class BeliefAgent(PlannerAgent):
         belief.hear(pose, heard.bearing.numpy(), squares.numpy(), active, audible)
         if not (self.protocol.requires_stop and self.stop_by == "belief"):
             belief.rule_out(pose[:, :2], self._near, active)
-        belief.score(graph.cost, active)
+        belief.score(graph.cost, active, self._sound_cost)
 
     def _targets(self, active: np.ndarray) -> np.ndarray:
         assert self._belief is not None
         around = self._goal if self.target == "goal" else None
-        return self._belief.targets(self.mapper.graph.cost, active, around)
+        cost = self.mapper.graph.cost
+        return self._belief.targets(cost, active, around, self._sound_cost)
+
+    @property
+    def _sound_cost(self) -> NDArray[np.float32] | None:
+        """Costs of the squares for sound; None where they are those of the agent."""
+        graph = self.mapper.sound_graph
+        return None if graph is None else graph.cost
 
     def _planned(self, active: np.ndarray) -> Tensor:
         """Return the first action of the shortest path; a turn for those who heard nothing."""

@@ -29,6 +29,8 @@ class SplitConfig:
     hashes : str, optional
         Generated apartments that are frozen: a table of hashes of floor plans in the package's
         `assets/floor_plan_hashes`. An apartment with another hash is refused. null for none.
+    more_training : int
+        Default of `training.generated` for rows whose networks train on generated apartments too.
     total_steps, validate_every : int
         Defaults of `algorithm.total_steps` and `algorithm.validate_every` of `algorithm=a3c` for
         agents that are trained on this split.
@@ -44,5 +46,6 @@ class SplitConfig:
     train_sources: int = 10
     sources: int = 5
     hashes: str | None = None
+    more_training: int = 0
     total_steps: int = 3_000_000
     validate_every: int = 250_000

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
@@ -19,7 +20,9 @@ from avn.core.random import derive
 PARTS = ("train", "validation", "test")
 FROZEN = Path(__file__).parents[1] / "assets" / "floor_plans"
 # Fields of a split that select no apartments: defaults of a training.
-DEFAULTS = ("total_steps", "validate_every")
+DEFAULTS = ("more_training", "total_steps", "validate_every")
+# Generated apartments that networks train on besides those of a folder, all but their number.
+MORE_TRAINING = SplitConfig(name="procedural", seed=1000, size="mixed", train_sources=10)
 
 
 def load_split(cfg: SplitConfig) -> Mapping[str, list[FloorPlan]]:
@@ -46,6 +49,36 @@ def load_split(cfg: SplitConfig) -> Mapping[str, list[FloorPlan]]:
         range.
     """
     return _generated(cfg) if cfg.folder is None else _frozen(cfg.folder)
+
+
+def more_training(cfg: SplitConfig, count: int) -> list[FloorPlan]:
+    """Generate apartments for training besides those of a folder.
+
+    They are the first training apartments of the split `procedural`, so none has the layout of a
+    validation or test apartment of any generated split.
+
+    Parameters
+    ----------
+    cfg : SplitConfig
+        Split of the training world.
+    count : int
+        Their number.
+
+    Raises
+    ------
+    UserError
+        If the number is negative, or the split is generated itself.
+    """
+    if count < 0:
+        raise UserError(f"training.generated: {count}; give 0 or more")
+    if not count:
+        return []
+    if cfg.folder is None:
+        raise UserError(
+            f"training.generated: the split '{cfg.name}' is generated itself; give 0, and more "
+            "apartments with training.scenes.train"
+        )
+    return _generated(dataclasses.replace(MORE_TRAINING, train=count))["train"]
 
 
 def _frozen(name: str) -> dict[str, list[FloorPlan]]:

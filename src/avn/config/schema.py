@@ -139,12 +139,16 @@ class TrainingConfig:
         Microphone of the training world, an option of `microphone`.
     sounds : dict of str to str
         Sounds of the training world, an option of `sound`.
+    generated : int
+        Generated apartments that networks train on besides those of a folder of `scenes`: the first
+        training apartments of `split=procedural`; 0 or more.
     """
 
     scenes: SplitConfig = _TEST_SPLIT
     acoustics: AcousticsConfig = _TEST_ACOUSTICS
     microphone: Option = MISSING
     sounds: dict[str, str] = MISSING
+    generated: int = 0
 
 
 @dataclass

@@ -37,12 +37,15 @@ class ApartmentViews:
         Depth along the camera's axis, metres; 0 for no surface.
     free, visible : (S, 5, 5) bool
         Free cells and visible cells of the window of each state.
+    rooms : (S, 5, 5) bool
+        Cells that are part of a room; see `avn.apartments.local_patch.window_rooms`.
     """
 
     rgb: Sequence[NDArray[np.uint8]]
     depth: Sequence[NDArray[np.float16]]
     free: NDArray[np.bool_]
     visible: NDArray[np.bool_]
+    rooms: NDArray[np.bool_]
 
 
 class ViewSet(Dataset[ViewBatch]):
@@ -79,6 +82,7 @@ class ViewSet(Dataset[ViewBatch]):
         self.apartment = torch.arange(len(sizes)).repeat_interleave(sizes)
         self.free = torch.from_numpy(np.concatenate([each.free for each in apartments])).float()
         self.visible = torch.from_numpy(np.concatenate([each.visible for each in apartments]))
+        self.rooms = torch.from_numpy(np.concatenate([each.rooms for each in apartments])).float()
 
     def __len__(self) -> int:
         """Return the number of states of all apartments."""
@@ -103,6 +107,7 @@ class ViewSet(Dataset[ViewBatch]):
             pictures=pictures,
             target=self.free[state],
             visible=self.visible[state],
+            rooms=self.rooms[state],
             inverse_depth=inverse,
         )
         if self.mirror:

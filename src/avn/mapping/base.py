@@ -31,6 +31,8 @@ class Mapper(ABC):
         Column and row before rounding to a square.
     graph : PartialGraph
         Nodes and edges for the planner.
+    sound_graph : PartialGraph or None
+        Where sound can go, which passes over furniture; None where it goes as the agent does.
     ground_truths : tuple of str
         Parts of the ground truth that it can be given: `map`, `pose`.
     in_exploration_frame : bool
@@ -47,6 +49,7 @@ class Mapper(ABC):
     pose: Tensor
     location: Tensor
     graph: PartialGraph
+    sound_graph: PartialGraph | None = None
     in_exploration_frame: bool = False
     retrieved: tuple[Tensor, Tensor] | None = None
 

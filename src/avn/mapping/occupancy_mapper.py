@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from avn.core.actions import HEADINGS
+from avn.core.errors import UserError
 from avn.core.pose import turned
 from avn.mapping.base import Mapper
 from avn.mapping.occupancy_map import CERTAIN, OccupancyMap
@@ -26,19 +27,35 @@ class OccupancyMapper(Mapper):
     ----------
     size : int
         Squares along each side of the map, odd, 11 or more.
+    rooms_above : float or None
+        Probability of being part of a room below which a square blocks sound, 0 to 1: the mapper
+        then maps walls apart from furniture, which sound passes over. None does not, and sound goes
+        where the agent can go.
+
+    Raises
+    ------
+    UserError
+        If `rooms_above` is out of range.
     """
 
     needs = ("local_patch",)
     ground_truths = ("map",)
 
-    def __init__(self, size: int = 101) -> None:
-        self.size = size
+    def __init__(self, size: int = 101, rooms_above: float | None = None) -> None:
+        if rooms_above is not None and not 0 <= rooms_above <= 1:
+            raise UserError(f"mapper.rooms_above: {rooms_above}; give 0 to 1, or null")
+        self.size, self.rooms_above = size, rooms_above
+        if rooms_above is not None:
+            self.needs = ("local_patch", "local_rooms")  # type: ignore[misc]
 
     def reset(self, n: int, rules: GraphRules) -> None:
         """Begin N new episodes, each in the middle of an unknown map. See `Mapper.reset`."""
         self.map = OccupancyMap(n, self.size)
         self.graph = PartialGraph(n, self.size, rules)
         self.graph.walls = self.map.walls.numpy()
+        if self.rooms_above is not None:
+            self._rooms = OccupancyMap(n, self.size)
+            self.sound_graph = PartialGraph(n, self.size, GraphRules(self.rooms_above))
         self._last = torch.zeros(n, 3, dtype=torch.int64)
 
     def set_ground_truth(self, part: str, simulator: Simulator) -> None:
@@ -65,6 +82,11 @@ class OccupancyMapper(Mapper):
         pose = observation["odometry"]
         squares = update_map(self.map, pose, self._last, observation, direction, sees=True)
         self.graph.set(squares, torch.sigmoid(self.map.log_odds.flatten(1).gather(1, squares)))
+        if self.sound_graph is not None:
+            self._rooms.mark_visited(pose)
+            seen = self._rooms.integrate(pose, observation["local_rooms"])
+            inside = torch.sigmoid(self._rooms.log_odds.flatten(1).gather(1, seen))
+            self.sound_graph.set(seen, inside)
         self._last = pose
         self.pose = pose + torch.tensor([self.map.centre, self.map.centre, 0])
         self.location = self.pose[:, :2].double()

@@ -13,6 +13,7 @@ from torchmetrics.functional.classification import (
 from torchmetrics.utilities.data import dim_zero_cat
 
 BINS = 15
+STATES = ("log_odds", "free", "visible", "rooms")
 
 
 def local_patch_metrics(probability: Tensor, free: Tensor, visible: Tensor) -> dict[str, float]:
@@ -79,14 +80,14 @@ def calibration(log_odds: Tensor, label: Tensor, steps: int = 30) -> Tensor:
 
 
 def calibrated(log_odds: Tensor, fitted: Tensor) -> Tensor:
-    """Return calibrated probabilities (N, 2, 5, 5).
+    """Return calibrated probabilities (N, k, 5, 5).
 
     Parameters
     ----------
-    log_odds : (N, 2, 5, 5) float tensor
-        Log-odds of free and of visible.
-    fitted : (2, 2) float tensor
-        Scale and offset of free and of visible, as `calibration` gives them.
+    log_odds : (N, k, 5, 5) float tensor
+        Log-odds of free, of visible and, if k = 3, of being part of a room.
+    fitted : (k, 2) float tensor
+        Scale and offset of each, as `calibration` gives them.
     """
     factor, shift = fitted[:, :, None, None].unbind(1)
     return torch.sigmoid(log_odds * factor + shift)
@@ -97,46 +98,53 @@ class LocalPatchScores(Metric):
 
     Attributes
     ----------
-    calibration : (2, 2) tensor
-        Scale and offset of the log-odds of free and of visible; see `calibrated`.
+    calibration : (k, 2) tensor
+        Scale and offset of the log-odds; see `calibrated`.
     """
 
     full_state_update = False
 
     def __init__(self) -> None:
         super().__init__()
-        for state in ("log_odds", "free", "visible"):
+        for state in STATES:
             self.add_state(state, default=[], dist_reduce_fx="cat")
         self.calibration = torch.tensor(((1.0, 0.0), (1.0, 0.0)))
 
-    def update(self, log_odds: Tensor, free: Tensor, visible: Tensor) -> None:
+    def update(self, log_odds: Tensor, free: Tensor, visible: Tensor, rooms: Tensor) -> None:
         """Add N local patches.
 
         Parameters
         ----------
-        log_odds : (N, 2, 5, 5) float tensor
-            Estimated log-odds of free and of visible.
+        log_odds : (N, k, 5, 5) float tensor
+            Estimated log-odds; see `calibrated`.
         free : (N, 5, 5) float tensor
             1 where a cell is free, else 0.
         visible : (N, 5, 5) bool tensor
             Whether the camera sees any of a cell.
+        rooms : (N, 5, 5) float tensor
+            1 where a cell is part of a room, else 0.
         """
         self.log_odds.append(log_odds)  # type: ignore[union-attr, operator]
         self.free.append(free)  # type: ignore[union-attr, operator]
         self.visible.append(visible)  # type: ignore[union-attr, operator]
+        self.rooms.append(rooms)  # type: ignore[union-attr, operator]
 
-    def gathered(self) -> tuple[Tensor, Tensor, Tensor]:
-        """Return all that was added: log-odds (N, 2, 5, 5), free and visible (N, 5, 5)."""
-        log_odds, free, visible = (
-            dim_zero_cat(getattr(self, state)) for state in ("log_odds", "free", "visible")
-        )
-        return log_odds, free, visible
+    def gathered(self) -> tuple[Tensor, ...]:
+        """Return all that was added: log-odds (N, k, 5, 5), and free, visible, rooms (N, 5, 5)."""
+        return tuple(dim_zero_cat(getattr(self, state)) for state in STATES)
 
     def compute(self) -> dict[str, float]:
-        """Return `local_patch_metrics`, and `auc/sight`, the AUC of visible against hidden."""
-        log_odds, free, visible = self.gathered()
+        """Return `local_patch_metrics`, `auc/sight` and, where they are estimated, `auc/rooms`.
+
+        `auc/sight` is the AUC of visible against hidden, `auc/rooms` that of rooms against the
+        rest, over visible cells.
+        """
+        log_odds, free, visible, rooms = self.gathered()
         prediction = calibrated(log_odds, self.calibration)
         metrics = local_patch_metrics(prediction[:, 0], free.bool(), visible)
         auc = binary_auroc(prediction[:, 1].flatten(), visible.int().flatten())
         metrics["auc/sight"] = float(auc)
+        if prediction.shape[1] > 2 and 0 < rooms[visible].sum() < visible.sum():
+            auc = binary_auroc(prediction[:, 2][visible], rooms[visible].int())
+            metrics["auc/rooms"] = float(auc)
         return metrics

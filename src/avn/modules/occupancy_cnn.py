@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import Any, ClassVar, TypedDict
 
 import torch
 from torch import Tensor, nn
@@ -26,6 +26,8 @@ class ViewBatch(TypedDict):
         1 where a cell is free, else 0.
     visible : (N, 5, 5) bool tensor
         Whether the camera sees any of a cell.
+    rooms : (N, 5, 5) float32 tensor
+        1 where a cell is part of a room or doorway, furnished or not, else 0.
     inverse_depth : (N, 1, H / 4, W / 4) float32 tensor
         1 / metres; 0 where there is no surface.
     """
@@ -33,9 +35,12 @@ class ViewBatch(TypedDict):
     pictures: Tensor
     target: Tensor
     visible: Tensor
+    rooms: Tensor
     inverse_depth: Tensor
 
 
+FREE_AND_VISIBLE = 2
+VISIBLE = 1
 WINDOW_NET: Part = {"_target_": "avn.modules.window_net.WindowNet"}
 
 
@@ -89,6 +94,8 @@ class OccupancyCnn(Network):
     what = "occupancy network"
     unit = "views"
     monitor = "loss/validation/all"
+    # estimates of each cell
+    outputs: ClassVar[int] = FREE_AND_VISIBLE
 
     def __init__(
         self,
@@ -125,9 +132,10 @@ class OccupancyCnn(Network):
         if visible_only:
             self.monitor = "loss/validation/visible"  # type: ignore[misc]
         self.depth_weight, self.scaled = depth_weight, scaled
-        built = self.build("net", camera=CameraConfig(**(camera or {})))
+        more = {} if self.outputs == FREE_AND_VISIBLE else {"outputs": self.outputs}
+        built = self.build("net", camera=CameraConfig(**(camera or {})), **more)
         self.net: nn.Module = built.to(memory_format=torch.channels_last)
-        self.register_buffer("calibration", torch.tensor(((1.0, 0.0), (1.0, 0.0))))
+        self.register_buffer("calibration", torch.tensor([(1.0, 0.0)] * self.outputs))
         self.training_loss = MeanMetric()
         # In a plain list metrics stay on the CPU and out of checkpoints.
         self.scores = [LocalPatchScores() for _ in SUBSETS]
@@ -142,14 +150,14 @@ class OccupancyCnn(Network):
 
         Returns
         -------
-        (N, 2, 5, 5) float32 tensor
+        (N, outputs, 5, 5) float32 tensor
             Calibrated probabilities that each cell is free, and that it is visible.
         """
         pictures = views.permute(0, 3, 1, 2).float() / 255
         return calibrated(self.log_odds(pictures), self.calibration)
 
     def log_odds(self, pictures: Tensor) -> Tensor:
-        """Map pictures (N, 3, H, W), 0 to 1, to uncalibrated log-odds (N, 2, 5, 5)."""
+        """Map pictures (N, 3, H, W), 0 to 1, to uncalibrated log-odds (N, outputs, 5, 5)."""
         if not self.flip_tta or self.training:
             return self._net(pictures)[0]
         straight, mirrored = self._net(torch.cat((pictures, pictures.flip(-1))))[0].chunk(2)
@@ -164,14 +172,25 @@ class OccupancyCnn(Network):
         log_odds, inverse_depth = self._net(batch["pictures"])
         visible = batch["visible"].float()
         loss = self._free_loss(log_odds[:, 0], batch["target"], visible)
-        seen = nn.functional.binary_cross_entropy_with_logits(log_odds[:, 1], visible)
         self.training_loss.update(loss.detach(), len(visible))
-        loss = loss + 0.5 * seen
+        loss = loss + self.other_losses(log_odds, batch)
         if self.depth_weight:
             known = (batch["inverse_depth"] > 0).float()
             error = (inverse_depth - batch["inverse_depth"]).abs() * known
             loss = loss + self.depth_weight * error.sum() / known.sum().clamp_min(1.0)
         return loss
+
+    def other_losses(self, log_odds: Tensor, batch: ViewBatch) -> Tensor:
+        """Return the losses of what it estimates of the cells besides free: half that of visible.
+
+        Parameters
+        ----------
+        log_odds : (N, outputs, 5, 5) float32 tensor
+        batch : ViewBatch
+        """
+        visible = batch["visible"].float()
+        seen = nn.functional.binary_cross_entropy_with_logits(log_odds[:, 1], visible)
+        return 0.5 * seen
 
     def _free_loss(self, log_odds: Tensor, free: Tensor, visible: Tensor) -> Tensor:
         each = nn.functional.binary_cross_entropy_with_logits(log_odds, free, reduction="none")
@@ -198,15 +217,18 @@ class OccupancyCnn(Network):
         """
         log_odds = self.log_odds(batch["pictures"]).cpu()
         target, visible = batch["target"].cpu(), batch["visible"].cpu()
-        self.scores[dataloader_idx].update(log_odds, target, visible)
+        self.scores[dataloader_idx].update(log_odds, target, visible, batch["rooms"].cpu())
 
     def on_validation_epoch_end(self) -> None:
         """Fit the calibration and log metrics such as `auc/validation/visible`."""
         if self.scaled:
-            log_odds, free, visible = self.scores[0].gathered()
+            log_odds, *labels = self.scores[0].gathered()
+            visible = labels[1]
             used = visible if self.visible_only else torch.ones_like(visible)
-            self.calibration[0] = calibration(log_odds[:, 0][used], free[used])
-            self.calibration[1] = calibration(log_odds[:, 1], visible.float())
+            for channel, label in enumerate(labels[: self.outputs]):
+                cells = torch.ones_like(used) if channel == VISIBLE else used
+                given = log_odds[:, channel][cells], label.float()[cells]
+                self.calibration[channel] = calibration(*given)
         for subset, scores in zip(SUBSETS, self.scores, strict=True):
             scores.calibration = self.calibration.cpu().clone()
             metrics = scores.compute()

@@ -25,7 +25,6 @@ PROBES = (
     (0.0, 0.0, 0.8),
     (0.0, 0.0, 1.3),
 )
-OUTPUTS = 2
 
 
 def probe_places(camera: CameraConfig) -> tuple[Tensor, Tensor]:
@@ -88,6 +87,8 @@ class WindowNet(nn.Module):
         Channels of each cell, 1 or more.
     dropout : float
         Dropout probability of a cell's channels, 0 or more and less than 1.
+    outputs : int
+        Estimates of each cell, 1 or more; the network's own number is given.
 
     Raises
     ------
@@ -105,6 +106,7 @@ class WindowNet(nn.Module):
         decoder: int = 32,
         cell: int = 64,
         dropout: float = 0.1,
+        outputs: int = 2,
     ) -> None:
         super().__init__()
         if len(widths) != 4 or min([*widths, decoder, cell]) < 1:
@@ -135,7 +137,7 @@ class WindowNet(nn.Module):
         self.scene = nn.Linear(sixteenth, cell)
         # Convolutions over the patch: walls continue, and near objects hide far cells.
         self.neighbours = nn.Sequential(_layer(cell, cell), _layer(cell, cell))
-        self.answer = nn.Conv2d(2 * cell, OUTPUTS, 1)
+        self.answer = nn.Conv2d(2 * cell, outputs, 1)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """Estimate log-odds of the cells and inverse depth in N pictures.
@@ -147,8 +149,8 @@ class WindowNet(nn.Module):
 
         Returns
         -------
-        log_odds : (N, 2, 5, 5) float32 tensor
-            Log-odds that each cell is free, and that it is visible.
+        log_odds : (N, outputs, 5, 5) float32 tensor
+            Log-odds that each cell is free, that it is visible, and that it is part of a room.
         inverse_depth : (N, 1, size / 4, size / 4) float32 tensor
             1 / metres along the optical axis.
         """

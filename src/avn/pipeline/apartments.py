@@ -20,7 +20,7 @@ from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.frozen_hashes import floor_plan_hash
 from avn.apartments.grid import build_grid
 from avn.apartments.settings import SplitConfig
-from avn.apartments.splits import DEFAULTS, PARTS, load_split
+from avn.apartments.splits import DEFAULTS, PARTS, load_split, more_training
 from avn.core.errors import UserError
 from avn.core.files import check_name, partial_folder
 from avn.core.hashing import canonical, digest
@@ -79,7 +79,9 @@ class Apartments:
         """
         split = OmegaConf.select(self.cfg, self.world.split)
         check_name(f"{self.world.split}.name", split.name)
-        plans = _plans(split)[self.subset]
+        plans = [*_plans(split)[self.subset]]
+        if self.in_training:
+            plans += _more_training(split, self.cfg.training.generated)
         if not plans:
             where = f" in {split.folder}" if split.folder else ""
             elsewhere = ", or train in another split with training.scenes=var"
@@ -111,7 +113,13 @@ class Apartments:
         if self.node("split").folder is None:
             every = (each.name for each in dataclasses.fields(SplitConfig))
             names = tuple(name for name in every if name not in DEFAULTS)
-        return tuple(f"{self.world.split}.{name}" for name in names)
+        keys = tuple(f"{self.world.split}.{name}" for name in names)
+        return (*keys, "training.generated") if self.in_training else keys
+
+    @property
+    def in_training(self) -> bool:
+        """True for the apartments that networks train on, with those of `training.generated`."""
+        return self.subset == "train" and self.world == TRAINING
 
     @property
     def title(self) -> str:
@@ -126,6 +134,7 @@ def apartments_of_all_subsets(cfg: DictConfig, world: WorldKeys = TEST) -> list[
 
 
 _READ: dict[str, Mapping[str, list[FloorPlan]]] = {}
+_MORE: dict[str, list[FloorPlan]] = {}
 _CELLS: dict[str, int] = {}
 _HASHES: dict[int, tuple[FloorPlan, str]] = {}
 
@@ -136,6 +145,13 @@ def _plans(split: DictConfig) -> Mapping[str, list[FloorPlan]]:
     if key not in _READ:
         _READ[key] = load_split(typed(split))
     return _READ[key]
+
+
+def _more_training(split: DictConfig, count: int) -> list[FloorPlan]:
+    key = canonical([split, count])
+    if key not in _MORE:
+        _MORE[key] = more_training(typed(split), count)
+    return _MORE[key]
 
 
 def plan_hash(plan: FloorPlan) -> str:

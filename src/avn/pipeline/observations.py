@@ -11,6 +11,7 @@ import torch
 from omegaconf import DictConfig
 from torch import Tensor
 
+from avn.apartments.local_patch import window_rooms
 from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.dataset.arrivals import true_arrivals
@@ -24,7 +25,12 @@ from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
 from avn.pipeline.dynamics import changing
 from avn.pipeline.live_audio import LiveInference
-from avn.pipeline.occupancy import LocalPatches, has_occupancy_model, true_local_patches
+from avn.pipeline.occupancy import (
+    LocalPatches,
+    has_occupancy_model,
+    sees_rooms,
+    true_local_patches,
+)
 from avn.pipeline.rendered_audio import Spectrograms, Waveforms
 from avn.pipeline.scenes import acoustics_of
 from avn.pipeline.sound_network import SourceEstimates, has_sound_model, hears_arrivals
@@ -36,6 +42,8 @@ from avn.pipeline.visual_features import VisualEmbeddings
 
 # Observations that every agent has without any stage.
 OWN = ("collided", "odometry")
+# Keys that change which cells the camera sees.
+_CAMERA = tuple(f"renderer.camera.{key}" for key in ("height", "pitch", "fov"))
 
 
 @dataclass(frozen=True)
@@ -101,6 +109,15 @@ def _true_patches(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tenso
     camera = typed(apartments.cfg.renderer.camera)
     both = [true_local_patches(plan, camera) for plan in apartments.plans]
     return [torch.where(visible, free.float(), torch.nan) for free, visible in both]
+
+
+def _true_rooms(apartments: Apartments, scenes: Sequence[Scene]) -> list[Tensor]:
+    camera = typed(apartments.cfg.renderer.camera)
+    both = [
+        (torch.from_numpy(window_rooms(plan)), true_local_patches(plan, camera)[1])
+        for plan in apartments.plans
+    ]
+    return [torch.where(visible, rooms.float(), torch.nan) for rooms, visible in both]
 
 
 OBSERVATIONS = {
@@ -184,7 +201,19 @@ OBSERVATIONS = {
         truth="local_patch",
         true=_true_patches,
         settings=("mapper.visible_above",),
-        true_settings=tuple(f"renderer.camera.{key}" for key in ("height", "pitch", "fov")),
+        true_settings=_CAMERA,
+    ),
+    "local_rooms": Observation(
+        shape="(5, 5): probability that cells ahead are part of a room; NaN where none can tell",
+        hint="choose what tells rooms from walls, such as occupancy_model=rooms",
+        audio=False,
+        stage=lambda cfg, apartments, clips: LocalPatches(cfg, apartments),
+        load=LocalPatches.rooms,
+        there=sees_rooms,
+        truth="local_patch",
+        true=_true_rooms,
+        settings=("mapper.visible_above",),
+        true_settings=_CAMERA,
     ),
 }
 

@@ -13,9 +13,9 @@ from torch import Tensor
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.apartments.grid import build_grid
-from avn.apartments.local_patch import window_cells
+from avn.apartments.local_patch import window_cells, window_rooms
 from avn.apartments.surfaces import build_surfaces
-from avn.core.classes import build_object
+from avn.core.classes import build_object, import_class
 from avn.core.errors import UserError
 from avn.core.progress import progress_bar
 from avn.core.settings import plain, typed
@@ -42,6 +42,12 @@ VIEWS_PER_SECOND = 200
 def has_occupancy_model(cfg: DictConfig) -> bool:
     """Return whether the config has an occupancy network."""
     return bool(cfg.occupancy_model.name != "none")
+
+
+def sees_rooms(cfg: DictConfig) -> bool:
+    """Return whether the occupancy network estimates which cells are part of a room."""
+    target = cfg.occupancy_model._target_
+    return has_occupancy_model(cfg) and hasattr(import_class("occupancy_model", target), "rooms")
 
 
 class OccupancyNetwork(Fitted):
@@ -143,7 +149,11 @@ def _seen(plan: FloorPlan, camera: CameraConfig, views: Sequence[Views]) -> Apar
 
     free, visible = true_local_patches(plan, camera)
     return ApartmentViews(
-        [v.rgb for v in views], [v.depth for v in views], free.numpy(), visible.numpy()
+        [v.rgb for v in views],
+        [v.depth for v in views],
+        free.numpy(),
+        visible.numpy(),
+        window_rooms(plan),
     )
 
 
@@ -162,8 +172,9 @@ def _surfaces(plan: FloorPlan) -> Any:
 class LocalPatches(ApartmentTensors):
     """Stage of local patches: the occupancy network's estimates in every state.
 
-    The product is (S, 2, 5, 5) float32 per apartment: probabilities of free, then of visible. Row r
-    is r + 1 cells ahead, column c is c - 2 cells to the right.
+    The product is (S, 2, 5, 5) float32 per apartment: probabilities of free, then of visible; with
+    a third, of being part of a room, if the network estimates it. Row r is r + 1 cells ahead,
+    column c is c - 2 cells to the right.
     """
 
     kind = "see/local_patches"
@@ -190,10 +201,17 @@ class LocalPatches(ApartmentTensors):
 
     def trusted(self) -> list[Tensor]:
         """Return probabilities of free, (S, 5, 5); NaN where visible is below the threshold."""
+        return self._where_visible(0)
+
+    def rooms(self) -> list[Tensor]:
+        """Return probabilities of being part of a room, as `trusted` those of free."""
+        return self._where_visible(2)
+
+    def _where_visible(self, channel: int) -> list[Tensor]:
         threshold = self.cfg.mapper.visible_above
         return [
-            torch.where(visible >= threshold, free, torch.nan)
-            for free, visible in (patches.unbind(1) for patches in self.load())
+            torch.where(patches[:, 1] >= threshold, patches[:, channel], torch.nan)
+            for patches in self.load()
         ]
 
 
@@ -212,8 +230,8 @@ def infer_local_patches(model: OccupancyCnn, views: Views, name: str) -> Tensor:
 
     Returns
     -------
-    (S, 2, 5, 5) float32 tensor
-        Probabilities of free, then of visible.
+    (S, 2 or 3, 5, 5) float32 tensor
+        See `LocalPatches`.
     """
     rgb, patches = views.rgb, []
     with progress_bar(f"looking in {name}", len(rgb), "views") as advance:

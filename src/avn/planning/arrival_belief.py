@@ -106,7 +106,12 @@ class ArrivalBelief(Searched):
         self._here[active] = pose[active, :2]
         self._headings[active, pose[active, 2]] = True
 
-    def score(self, cost: NDArray[np.float32], active: NDArray[np.bool_]) -> None:
+    def score(
+        self,
+        cost: NDArray[np.float32],
+        active: NDArray[np.bool_],
+        sound_cost: NDArray[np.float32] | None = None,
+    ) -> None:
         """Compute the posterior on the graphs of now.
 
         The fields of earlier places are repaired only where a square has become a node, or is none
@@ -118,9 +123,12 @@ class ArrivalBelief(Searched):
             See `PartialGraph`.
         active : (N,) bool
             Agents to update.
+        sound_cost : (N, M, M) float32, optional
+            Costs of the squares for sound; `cost` by default.
         """
         kept = (self._weight > _LEAST_WEIGHT) & active[:, None]
-        self._fields.update(cost, self._position, kept, active)
+        heard_through = cost if sound_cost is None else sound_cost
+        self._fields.update(heard_through, self._position, kept, active)
         row, slot = np.nonzero(kept)
         bearing = np.zeros((*kept.shape, self.bins + 1), dtype=np.float32)
         log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))
@@ -171,6 +179,7 @@ class ArrivalBelief(Searched):
         cost: NDArray[np.float32],
         active: NDArray[np.bool_],
         offsets: NDArray[np.int64] | None = None,
+        sound_cost: NDArray[np.float32] | None = None,
     ) -> NDArray[np.int64]:
         """Return the column and row of the square that each agent walks to, (N, 2) int64.
 
@@ -186,6 +195,8 @@ class ArrivalBelief(Searched):
             Offsets in columns and rows from a square to where the source may be for an agent to
             succeed there: the square with the greatest probability of success is returned. By
             default the likeliest square of the source.
+        sound_cost : (N, M, M) float32, optional
+            See `score`.
         """
         best = np.zeros(len(cost), dtype=np.int64)
         rows = np.flatnonzero(active)
@@ -195,7 +206,7 @@ class ArrivalBelief(Searched):
             self.searched[again] = False
             none = np.zeros_like(active)
             none[again] = True
-            self.score(cost, none)
+            self.score(cost, none, sound_cost)
             best[again], _ = self._best(again, offsets)
         return np.stack((best % cost.shape[1], best // cost.shape[1]), 1)
 
