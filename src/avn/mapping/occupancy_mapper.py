@@ -38,7 +38,7 @@ class OccupancyMapper(Mapper):
         If `rooms_above` is out of range.
     """
 
-    needs = ("local_patch",)
+    needs: tuple[str, ...] = ("local_patch",)  # type: ignore[misc]
     ground_truths = ("map",)
 
     def __init__(self, size: int = 101, rooms_above: float | None = None) -> None:
@@ -46,7 +46,7 @@ class OccupancyMapper(Mapper):
             raise UserError(f"mapper.rooms_above: {rooms_above}; give 0 to 1, or null")
         self.size, self.rooms_above = size, rooms_above
         if rooms_above is not None:
-            self.needs = ("local_patch", "local_rooms")  # type: ignore[misc]
+            self.needs = ("local_patch", "local_rooms")
 
     def reset(self, n: int, rules: GraphRules) -> None:
         """Begin N new episodes, each in the middle of an unknown map. See `Mapper.reset`."""

@@ -36,17 +36,24 @@ class WorldKeys:
     ----------
     split, acoustics, microphone, sounds : str
         Keys of the apartments, the acoustics, the microphone and the sounds.
+    generated : str, optional
+        Key of the number of generated training apartments besides those of the split.
     """
 
     split: str
     acoustics: str
     microphone: str
     sounds: str
+    generated: str | None = None
 
 
 TEST = WorldKeys("split", "acoustics", "microphone", "sound")
 TRAINING = WorldKeys(
-    "training.scenes", "training.acoustics", "training.microphone", "training.sounds"
+    "training.scenes",
+    "training.acoustics",
+    "training.microphone",
+    "training.sounds",
+    "training.generated",
 )
 
 
@@ -80,8 +87,8 @@ class Apartments:
         split = OmegaConf.select(self.cfg, self.world.split)
         check_name(f"{self.world.split}.name", split.name)
         plans = [*_plans(split)[self.subset]]
-        if self.in_training:
-            plans += _more_training(split, self.cfg.training.generated)
+        if key := self._generated:
+            plans += _more_training(split, OmegaConf.select(self.cfg, key))
         if not plans:
             where = f" in {split.folder}" if split.folder else ""
             elsewhere = ", or train in another split with training.scenes=var"
@@ -114,12 +121,11 @@ class Apartments:
             every = (each.name for each in dataclasses.fields(SplitConfig))
             names = tuple(name for name in every if name not in DEFAULTS)
         keys = tuple(f"{self.world.split}.{name}" for name in names)
-        return (*keys, "training.generated") if self.in_training else keys
+        return (*keys, self._generated) if self._generated else keys
 
     @property
-    def in_training(self) -> bool:
-        """True for the apartments that networks train on, with those of `training.generated`."""
-        return self.subset == "train" and self.world == TRAINING
+    def _generated(self) -> str | None:
+        return self.world.generated if self.subset == "train" else None
 
     @property
     def title(self) -> str:
