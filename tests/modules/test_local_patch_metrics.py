@@ -74,7 +74,7 @@ def test_scores_gather_batches() -> None:
     scores = LocalPatchScores()
     scores.calibration = torch.tensor(((2.0, 0.5), (1.0, 0.0)))
     for part in (slice(0, 4), slice(4, 6)):
-        scores.update(log_odds[part], free[part], visible[part])
+        scores.update(log_odds[part], free[part], visible[part], free[part])
     said = calibrated(log_odds, scores.calibration)
     torch.testing.assert_close(said[:, 0], torch.sigmoid(2 * log_odds[:, 0] + 0.5))
     found = scores.compute()

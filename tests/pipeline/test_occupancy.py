@@ -5,9 +5,16 @@ import torch
 from small import composed
 from synthetic_scene import synthetic_scene
 
+from avn.core.errors import UserError
 from avn.modules.local_patch_metrics import local_patch_metrics
 from avn.pipeline.apartments import Apartments
-from avn.pipeline.occupancy import LocalPatches, local_patch_errors, true_local_patches
+from avn.pipeline.observations import Observed
+from avn.pipeline.occupancy import (
+    LocalPatches,
+    local_patch_errors,
+    sees_rooms,
+    true_local_patches,
+)
 from avn.views.settings import CameraConfig
 
 
@@ -41,3 +48,24 @@ def test_cells_that_are_not_visible_enough_tell_nothing():
         assert torch.equal(told, visible >= least)
         assert torch.equal(trusted[told], free[told])
         assert told.float().mean() == pytest.approx(share, abs=0.1)
+
+
+def test_rooms_are_observed_of_a_network_that_tells_them() -> None:
+    told = composed("agent=belief", "split=mini")
+    assert sees_rooms(told)
+    assert not sees_rooms(composed("agent=plan_noexp", "split=mini"))
+    assert not sees_rooms(composed("agent=greedy", "split=mini"))
+
+    class Given(LocalPatches):
+        def load(self):
+            return [torch.full((2, 3, 5, 5), 0.5) * torch.tensor((1.0, 0.5, 0.2)).view(1, 3, 1, 1)]
+
+    patches = Given(told, Apartments(told, "test"))
+    assert torch.equal(patches.rooms()[0], torch.full((2, 5, 5), 0.1))
+    assert torch.equal(patches.trusted()[0], torch.full((2, 5, 5), 0.5))
+
+
+def test_a_map_of_rooms_needs_a_network_that_tells_them() -> None:
+    cfg = composed("agent=belief", "split=mini", "occupancy_model=small")
+    with pytest.raises(UserError, match=r"needs the observation 'local_rooms': choose what tells"):
+        Observed(Apartments(cfg, "test"), ("local_rooms",)).check("belief", ("local_rooms",))

@@ -59,6 +59,24 @@ def test_a_source_behind_a_wall_is_looked_for_through_the_door():
     assert x > 27
 
 
+def test_a_source_behind_furniture_is_heard_over_it():
+    # a table across a room, around which the agent walks at the right side
+    sound = np.ones((1, SIZE, SIZE), np.float32)
+    walkable = sound.copy()
+    walkable[0, 16, :30] = np.inf
+    source, poses = (12, 22), [(10, 10, 0), (11, 10, 1), (12, 10, 1)]
+    belief = ArrivalBelief(1, SIZE, BINS, ArrivalModel())
+    for pose in poses:
+        belief.hear(np.array([pose]), *heard(sound, pose, source), ALL)
+    belief.score(walkable, ALL, sound)
+    found = belief.targets(walkable, ALL, sound_cost=sound)[0]
+    assert np.abs(found - source).max() <= 1
+    assert belief.log_belief[0, 16, 12] == -np.inf, "a source stands where the agent can go"
+    # on the map of the agent the same evidence is of this side of the table
+    belief.score(walkable, ALL)
+    assert belief.targets(walkable, ALL)[0][1] < 16
+
+
 def test_two_bearings_cross_at_the_source():
     model = ArrivalModel(distance_weight=0, kept=1)
     source, cost = (25, 18), np.ones((1, SIZE, SIZE), np.float32)
