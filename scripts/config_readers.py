@@ -14,7 +14,7 @@ from avn.config.folder import conf_folder
 from avn.core.errors import UserError
 from avn.pipeline import export
 from avn.pipeline.models import MODELS
-from avn.pipeline.observations import OBSERVATIONS
+from avn.pipeline.observation_table import OBSERVATIONS
 from avn.pipeline.run import Evaluation
 from avn.pipeline.stage import Stage
 

@@ -29,7 +29,8 @@ from avn.navigation.start_sampler import build_start_sampler
 from avn.pipeline.agent import build_agent
 from avn.pipeline.apartments import TEST, TRAINING, Apartments
 from avn.pipeline.audio_inference import SELECTION_CLIPS, TRAINING_CLIPS, Clips
-from avn.pipeline.observations import OBSERVATIONS, OWN, Observed
+from avn.pipeline.observation_table import OBSERVATIONS, OWN
+from avn.pipeline.observations import Observed
 from avn.pipeline.policy import learns
 from avn.pipeline.policy_data import build_algorithm
 from avn.pipeline.run import episodes_of

@@ -15,7 +15,8 @@ from avn.navigation.protocols import Protocol
 from avn.navigation.scene_batch import SceneBatch, build_scene_batch
 from avn.pipeline.apartments import TRAINING, Apartments
 from avn.pipeline.audio_inference import SELECTION_CLIPS, TRAINING_CLIPS
-from avn.pipeline.observations import OBSERVATIONS, Observed
+from avn.pipeline.observation_table import OBSERVATIONS
+from avn.pipeline.observations import Observed
 from avn.pipeline.occupancy import has_occupancy_model
 from avn.pipeline.scenes import Geometry
 from avn.pipeline.sound_network import has_sound_model
