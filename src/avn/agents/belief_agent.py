@@ -63,6 +63,8 @@ class BeliefAgent(PlannerAgent):
         Other parameters of `PlannerAgent`, without those of its source filter.
     """
 
+    uses_sound_graph = True
+
     def __init__(
         self,
         mapper: Mapper,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import torch
@@ -77,6 +77,9 @@ class PlannerAgent(Agent):
     UserError
         If a setting is out of range, or the mapper has no use for an oracle input.
     """
+
+    # whether it plans by the paths of sound, `Mapper.sound_graph`
+    uses_sound_graph: ClassVar[bool] = False
 
     def __init__(
         self,

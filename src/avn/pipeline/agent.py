@@ -123,6 +123,8 @@ def agent_ignored(cfg: DictConfig) -> list[str]:
     if cfg.planner._target_:
         mapper: Mapper = build_object("mapper", cfg.mapper)
         unread += [f"mapper.{name}" for name in mapper.unused_settings()]
+        if not getattr(agent, "uses_sound_graph", False):
+            unread.append("mapper.rooms_above")
     if policy.learns(cfg):
         acting = ("baseline.samples",)
         unused = [key for key in policy.Policy(cfg).ignored() if key.startswith("baseline.")]
