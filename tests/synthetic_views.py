@@ -22,7 +22,7 @@ def synthetic_views(count: int, seed: int, size: int = 32, appearances: int = 1)
         for cell, (x, y) in enumerate(pixels):
             views[free.reshape(count, 25)[:, cell], y - 1 : y + 2, x - 1 : x + 2] += 150
         rgb.append(views)
-    rooms = free | (rng.random((count, 5, 5)) < 0.5)
     depth = rng.uniform(1, 5, (count, size, size)).astype(np.float16)
     depth[:, :4] = 0
+    rooms = free | (rng.random((count, 5, 5)) < 0.5)
     return ApartmentViews(rgb, [depth] * appearances, free, visible, rooms)
