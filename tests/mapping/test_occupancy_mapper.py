@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 import torch
+from synthetic_scene import synthetic_scene
 from tensordict import TensorDict
 
+from avn.apartments.grid import squares_of
 from avn.core.errors import UserError
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.planning.partial_graph import GraphRules
@@ -38,6 +43,20 @@ def test_sound_passes_over_furniture_and_not_through_walls() -> None:
     assert (walk[14, ahead] == torch.inf).all()
     assert (sound[14, ahead] == torch.inf).all()
     assert (sound[5] == 1).all(), "where nothing is known, sound may go"
+
+
+def test_the_true_map_has_the_true_walls() -> None:
+    scene = synthetic_scene("a")
+    start = torch.tensor([5, 8])
+    mapper = OccupancyMapper(size=41, rooms_above=0.05)
+    mapper.reset(2, GraphRules(0.05, 1.0))
+    mapper.set_ground_truth("map", SimpleNamespace(scene=scene, start=start))  # type: ignore[arg-type]
+    rooms = len(squares_of(scene.plan)[0])
+    for agent in range(2):
+        walk, sound = mapper.graph.cost[agent], mapper.sound_graph.cost[agent]
+        assert np.isfinite(walk).sum() == scene.grid.cells
+        assert np.isfinite(sound).sum() == rooms
+        assert np.isfinite(sound[np.isfinite(walk)]).all()
 
 
 def test_without_the_map_of_rooms_sound_goes_where_the_agent_goes() -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
+from avn.apartments.grid import squares_of
 from avn.core.actions import HEADINGS
 from avn.core.errors import UserError
 from avn.core.pose import turned
@@ -62,16 +65,31 @@ class OccupancyMapper(Mapper):
         """Set the true map in the frame of each start. See `Mapper.set_ground_truth`."""
         if part != "map":
             super().set_ground_truth(part, simulator)
-        lattice = torch.from_numpy(simulator.scene.grid.lattice).long()
+        scene = simulator.scene
+        self._set_true(self.map, self.graph, scene.grid.lattice, simulator)
+        if self.sound_graph is not None:
+            plan = getattr(scene, "plan", None)  # a drawn scene has none, and no furniture
+            rooms = scene.grid.lattice if plan is None else squares_of(plan)[0]
+            self._set_true(self._rooms, self.sound_graph, rooms, simulator)
+
+    def _set_true(
+        self,
+        beliefs: OccupancyMap,
+        graph: PartialGraph,
+        lattice: NDArray[np.int32],
+        simulator: Simulator,
+    ) -> None:
+        """Set a map and its graph to some squares (S, 2), in the frame of each start."""
+        cells = torch.from_numpy(simulator.scene.grid.lattice).long()
         start, heading = simulator.start // HEADINGS, simulator.start % HEADINGS
-        away = lattice[None] - lattice[start][:, None]
+        away = torch.from_numpy(lattice).long()[None] - cells[start][:, None]
         squares = turned(away, -heading % HEADINGS)
-        inside = (squares.abs() <= self.map.centre).all(dim=-1)
+        inside = (squares.abs() <= beliefs.centre).all(dim=-1)
         squares = torch.where(inside[..., None], squares, 0)
-        self.map.log_odds.fill_(-CERTAIN)
-        self.map.log_odds.flatten(1).scatter_(1, self.map.flat(squares), CERTAIN)
+        beliefs.log_odds.fill_(-CERTAIN)
+        beliefs.log_odds.flatten(1).scatter_(1, beliefs.flat(squares), CERTAIN)
         every = torch.arange(self.size**2).expand(len(start), -1)
-        self.graph.set(every, self.map.belief.flatten(1))
+        graph.set(every, beliefs.belief.flatten(1))
 
     def belief(self, rows: Tensor) -> Tensor:
         """Return the probability that each square is free. See `Mapper.belief`."""
