@@ -87,7 +87,33 @@ def test_the_loss_is_least_for_the_truth():
     assert best < loss([30.0, 200.0], 3.0, -4.0)
 
 
-@pytest.mark.parametrize(("key", "value"), [("bins", 30), ("bins", 256), ("spread", 0.0)])
+@pytest.mark.parametrize(("metres", "weight"), [(0.5, 8.0), (1.5, 4.0), (3.0, 1.0), (6.0, 1.0)])
+def test_errors_of_near_lengths_count_as_often_as_those_of_far_ones(metres, weight):
+    # pairs grow with the square of the length: one of 1.5 m stands for four
+    target, sight = torch.cat((targets([0.0], metres), targets([0.0], 6.0))), torch.ones(2).bool()
+
+    def loss(near, far, model):
+        raw = torch.zeros(2, 72 + OTHERS)
+        raw[:, 72] = target[:, 2] + torch.tensor([near, far])
+        return float(model.loss(raw, target, sight))
+
+    for model, factor in ((network(), weight), (network(near_weight=1.0), 1.0)):
+        exact = loss(0.0, 0.0, model)
+        grown = loss(0.2, 0.0, model) - exact, loss(0.0, 0.2, model) - exact
+        assert grown[0] / grown[1] == pytest.approx(factor, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("bins", 30),
+        ("bins", 256),
+        ("spread", 0.0),
+        ("near_below", 0.0),
+        ("near_weight", 0.5),
+        ("near_weight", math.nan),
+    ],
+)
 def test_settings_out_of_range_are_refused(key, value):
     with pytest.raises(UserError, match=f"sound_model.{key}"):
         network(**{key: value})

@@ -77,6 +77,27 @@ def test_a_source_behind_furniture_is_heard_over_it():
     assert belief.targets(walkable, ALL)[0][1] < 16
 
 
+@pytest.mark.parametrize("shared", [0.0, 1.0])
+def test_a_source_is_found_where_the_agent_stands(shared):
+    # sound that comes from all directions alike is of the square itself as much as of any other
+    source, model = (14, 12), ArrivalModel(shared_by_headings=shared)
+    belief, one = ArrivalBelief(1, SIZE, BINS, model), walk(rooms(), [(13, 12, 1)], source, model)
+    nowhere = np.full((1, BINS), -math.log(BINS), np.float32)
+    for heading in range(4):
+        pose = np.array([(*source, heading)])
+        belief.hear(pose, nowhere, np.float32([[0, 50]]), ALL)
+        one.hear(pose, nowhere, np.float32([[0, 50]]), ALL)
+    belief.score(rooms(), ALL)
+    one.score(rooms(), ALL)
+    np.testing.assert_allclose(
+        belief.log_belief[0, 10:20, 10:30], belief.log_belief[0, 12, 14], rtol=1e-3
+    )
+    assert tuple(one.targets(rooms(), ALL)[0]) == source
+    # where it heard the sound from one direction, the source is not: here beyond the wall instead
+    away = walk(rooms(), [(12, 12, 1)], (20, 12), model).log_belief[0]
+    assert away[12, 12] < away[12, 13:28].max() - 3
+
+
 def test_two_bearings_cross_at_the_source():
     model = ArrivalModel(distance_weight=0, kept=1)
     source, cost = (25, 18), np.ones((1, SIZE, SIZE), np.float32)

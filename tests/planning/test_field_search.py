@@ -38,9 +38,9 @@ def line(x0, y0, x1, y1):
 def whole_search(cost, place, reach):
     """Length and direction of each square: buckets are stacks, as the module says."""
     size = len(cost)
-    length, direction = np.full((size, size), UNREACHED), np.full((size, size), BINS)
+    length, direction = np.full((size, size), UNREACHED), np.full((size, size), BINS + 1)
     px, py = place
-    length[py, px] = 0
+    length[py, px], direction[py, px] = 0, BINS
     buckets, before, aims, done = {0: [(px, py)]}, {}, {(px, py): None}, set()
     for now in range(reach * STRAIGHT + 1):
         stack = buckets.get(now, [])

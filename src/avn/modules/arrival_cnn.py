@@ -31,12 +31,22 @@ class ArrivalCnn(SoundCnn):
     spread over neighbouring bins; Gaussian log-likelihoods of the logarithm of the path's length
     and of the location; cross-entropy of being in sight.
 
+    The number of pairs of source and agent grows with the square of the length between them. A
+    network that learns from all of them alike expects the frequent lengths, and hears a source that
+    is near as farther away. The loss of the length of a clip has therefore the weight
+    (`near_below` / length)^2, at least 1 and at most `near_weight`, so that the logarithms of near
+    lengths count evenly.
+
     Parameters
     ----------
     bins : int
         Directions of arrival, a multiple of 4 from 8 to 252.
     spread : float
         Standard deviation of the label of the direction, degrees, more than 0 and up to 90.
+    near_below : float
+        Length below which clips have a greater weight, metres, more than 0.
+    near_weight : float
+        Greatest weight of a clip, 1 or more; 1 for none.
     net : dict
         Config of the network on the spectrogram, with `_target_`.
     **recipe
@@ -52,12 +62,23 @@ class ArrivalCnn(SoundCnn):
     monitor = "loss/validation"
 
     def __init__(
-        self, bins: int = 72, spread: float = 5.0, net: Part = HEADS, **recipe: Any
+        self,
+        bins: int = 72,
+        spread: float = 5.0,
+        near_below: float = 3.0,
+        near_weight: float = 8.0,
+        net: Part = HEADS,
+        **recipe: Any,
     ) -> None:
         check_bins(bins)
         if not 0 < spread <= 90:
             raise UserError(f"sound_model.spread: {spread}; give more than 0 and up to 90 degrees")
+        if not 0 < near_below < math.inf:
+            raise UserError(f"sound_model.near_below: {near_below}; give metres, more than 0")
+        if not 1 <= near_weight < math.inf:
+            raise UserError(f"sound_model.near_weight: {near_weight}; give 1 or more, 1 for none")
         self.bins, self.spread = bins, math.radians(spread)
+        self.near_below, self.near_weight = near_below, near_weight
         super().__init__(net=net, **recipe)
         self.training_loss = MeanMetric()
         self.losses = [MeanMetric() for _ in SUBSETS]
@@ -118,7 +139,7 @@ class ArrivalCnn(SoundCnn):
         return batch["pictures"]
 
     def loss(self, outputs: Tensor, target: Tensor, in_sight: Tensor) -> Tensor:
-        """Compute the sum of the losses of the heads.
+        """Compute the sum of the losses of the heads, means over the clips.
 
         Parameters
         ----------
@@ -142,7 +163,8 @@ class ArrivalCnn(SoundCnn):
         away = (location - heard.location).square().sum(1)
         sigma = heard.location_sigma
         place = 0.5 * away / sigma.square() + 2 * sigma.log()
-        return (bearing + length + sight + 0.5 * place).mean()
+        near = (self.near_below / log_length.exp()).square().clamp(1.0, self.near_weight)
+        return (bearing + sight + 0.5 * place).mean() + (near * length).sum() / near.sum()
 
     def name_sounds(self, sounds: Sequence[str]) -> None:
         """Set the names of the sounds, by index; metrics are grouped by them."""

@@ -130,7 +130,7 @@ class ArrivalBelief(Searched):
         heard_through = cost if sound_cost is None else sound_cost
         self._fields.update(heard_through, self._position, kept, active)
         row, slot = np.nonzero(kept)
-        bearing = np.zeros((*kept.shape, self.bins + 1), dtype=np.float32)
+        bearing = np.zeros((*kept.shape, self.bins + 2), dtype=np.float32)
         log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))
         bearing[row, slot] = self._bearing_terms(row, slot)
         log_length[row, slot], precision[row, slot] = self._length_terms(row, slot)
@@ -148,16 +148,20 @@ class ArrivalBelief(Searched):
         )
 
     def _bearing_terms(self, row: NDArray[np.int64], slot: NDArray[np.int64]) -> NDArray[Any]:
-        """Return the weighted log-probability of each direction, and of none, (R, B + 1)."""
+        """Return the weighted log-probability of each direction, of none, and beyond, (R, B + 2).
+
+        A source where it is heard has no direction: all are as likely.
+        """
         count, model = self._count[row, slot], self.model
         mean = self._bearing[row, slot] / np.maximum(count, 1)[..., None]
         terms = np.log((1 - model.blur) * np.exp(mean) + model.blur / self.bins)
         summed = (terms * (count > 0)[..., None]).sum(1)
         headings = (count > 0).sum(1).astype(np.float32)
         part = headings ** -np.float32(model.shared_by_headings or 0.0)
-        terms = model.bearing_weight * (part * self._weight[row, slot])[:, None] * summed
+        weight = (model.bearing_weight * part * self._weight[row, slot])[:, None]
+        terms, none = weight * summed, weight * headings[:, None] * -np.float32(np.log(self.bins))
         # beyond the reach is less likely than the least likely direction
-        return np.concatenate((terms, terms.min(1, keepdims=True) - 5), 1)
+        return np.concatenate((terms, none, terms.min(1, keepdims=True) - 5), 1)
 
     def _length_terms(
         self, row: NDArray[np.int64], slot: NDArray[np.int64]

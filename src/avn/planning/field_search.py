@@ -103,7 +103,7 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
     count = _invalidate(length, direction, state, steps, start, bins, changes, mark, listed, width)
     used = 0
     if count < 0:
-        length[:], direction[:] = UNREACHED, bins
+        length[:], direction[:] = UNREACHED, bins + 1
         for square in range(len(state)):
             state[square] = (state[square] & SIGHT) | NOWHERE
         mark[:] = RESTING
@@ -152,7 +152,7 @@ def _invalidate(  # type: ignore[no-untyped-def]
     i = 0
     while i < count:
         square = listed[i]
-        length[square], direction[square] = UNREACHED, bins
+        length[square], direction[square] = UNREACHED, bins + 1
         state[square] = (state[square] & SIGHT) | NOWHERE
         for k in range(8):
             there = square + UP[k] * width + RIGHT[k]
@@ -231,7 +231,8 @@ def _settle(  # type: ignore[no-untyped-def]
         waiting, old = mark[square], state[square]
         if length[square] != now or (waiting != KNOWN and waiting != LOOKING):
             continue
-        way, sight, aim, bent = old & FROM, old & SIGHT, bins, 0
+        way, sight, bent = old & FROM, old & SIGHT, 0
+        aim = bins if square == start else bins + 1
         if now <= most and square != start:
             before = square - UP[way] * width - RIGHT[way]
             bent = state[before] & BENT

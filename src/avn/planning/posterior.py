@@ -76,8 +76,8 @@ def score(  # type: ignore[no-untyped-def]
     """Set `log_belief` of the active agents. See `ArrivalBelief.score`.
 
     `kept` is the places that count, (N, K). `fields` is `SoundFields.framed`; `terms` are the
-    log-probability of each direction, (N, K, B + 1), and mean and precision of the log-length,
-    (N, K) each.
+    log-probability of each direction, of none and of what is beyond, (N, K, B + 2), and mean and
+    precision of the log-length, (N, K) each.
     """
     length, direction = fields
     bearing, log_length, precision = terms

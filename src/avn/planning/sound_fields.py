@@ -39,7 +39,7 @@ class SoundFields:
     reach : int
         Squares up to which paths are followed.
     bins : int
-        Number of directions B, at most 255; bin b is centred at b/B turns clockwise from the front
+        Number of directions B, at most 254; bin b is centred at b/B turns clockwise from the front
         of the map.
 
     Attributes
@@ -47,7 +47,7 @@ class SoundFields:
     length : (N, K, M, M) int16
         Length of the path to each square, in units of `SQUARES`; `UNREACHED` beyond.
     direction : (N, K, M, M) uint8
-        Bin of the direction in which it leaves; `bins` where the agent is, and beyond.
+        Bin of the direction in which it leaves; B where the agent is, and B + 1 beyond.
     framed : pair of (N, K, M + 2, M + 2) arrays
         Both with a margin of one square, contiguous.
     """
@@ -58,7 +58,7 @@ class SoundFields:
         shape = (n, places, width, width)
         self.framed = (
             np.full(shape, UNREACHED, dtype=np.int16),
-            np.full(shape, bins, dtype=np.uint8),
+            np.full(shape, bins + 1, dtype=np.uint8),
         )
         self._state = np.full(shape, NOWHERE, dtype=np.uint8)
         self.length, self.direction = (own[:, :, 1:-1, 1:-1] for own in self.framed)
