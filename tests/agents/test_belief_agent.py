@@ -13,8 +13,10 @@ from small_places import FLAT, STOP, VAR
 
 from avn.agents.belief_agent import BeliefAgent, goal_offsets
 from avn.core.errors import UserError
+from avn.core.heard import bearing_label
+from avn.dataset.source_locations import locate_sources
 from avn.mapping.occupancy_mapper import OccupancyMapper
-from avn.navigation.navigation_scene import draw
+from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.protocols import Protocol
 from avn.planning.arrival_belief import ArrivalBelief
 from avn.planning.settings import ArrivalModel
@@ -40,6 +42,26 @@ def test_directions_alone_lead_to_the_source():
     model = ArrivalModel(distance_weight=0)
     frame = run(BeliefAgent(OccupancyMapper(SIZE), model=model, obstacle_threshold=0.01), VAR)
     assert frame["success"].mean() > 0.95
+
+
+def through_walls(scene: DrawnScene) -> torch.Tensor:
+    """Exact arrivals in a straight line, (K, S, 1, 1, B + 6)."""
+    locations, _ = locate_sources(scene)
+    metres = torch.linalg.vector_norm(locations, dim=-1, keepdim=True)
+    unit = torch.where(metres > 1e-6, locations / metres.clamp_min(1e-6), 0.0)
+    label = bearing_label(unit.flatten(0, 1), BINS, math.tau / BINS).unflatten(0, unit.shape[:2])
+    rest = torch.full((*metres.shape[:2], 5), 0.1)
+    length = metres.clamp_min(0.25).log()
+    return torch.cat((label.clamp_min(1e-9).log(), length, rest), -1)[:, :, None, None]
+
+
+def test_it_follows_sound_through_walls_where_that_is_how_it_arrives():
+    arrival, spl = through_walls(draw("flat", FLAT)), {}
+    for direct_path in ("transmission", "diffraction"):
+        agent = BeliefAgent(OccupancyMapper(SIZE), direct_path=direct_path, obstacle_threshold=0.01)
+        spl[direct_path] = run(agent, STOP, arrival)["spl"].mean()
+    assert spl["transmission"] > 0.97
+    assert spl["diffraction"] < spl["transmission"] - 0.02
 
 
 def test_an_agent_that_hears_nothing_arrives_less_often():
@@ -92,6 +114,8 @@ def test_settings_without_effect_are_named():
         BeliefAgent(OccupancyMapper(SIZE), stop_by="luck")
     with pytest.raises(UserError, match=r"planner\.stop_above: 0"):
         BeliefAgent(OccupancyMapper(SIZE), stop_above=0)
+    with pytest.raises(UserError, match=r"planner\.direct_path: 'bent' is none of diffraction, "):
+        BeliefAgent(OccupancyMapper(SIZE), direct_path="bent")
     with pytest.raises(UserError, match=r"planner\.target: 'door'"):
         BeliefAgent(OccupancyMapper(SIZE), target="door")
 

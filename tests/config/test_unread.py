@@ -36,6 +36,7 @@ def missing_error(command, *arguments):
         (("agent=plan_exp", "mapper.heading=nearest"), "mapper.heading"),
         (("agent=plan_noexp", "mapper.rooms_above=0.1", "occupancy_model=rooms"),
          "mapper.rooms_above"),
+        (("agent=belief", "acoustics=resonance", "mapper.rooms_above=0.1"), "mapper.rooms_above"),
         (("agent=random_walk", "training.generated=1"), "training.generated"),
         (("agent=a3c_va", "mapper=spatial_memory"), "mapper"),
         (("agent=a3c_va_mapper", "mapper=spatial_memory", "occupancy_model=small"), "mapper"),

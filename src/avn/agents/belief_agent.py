@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 STOPS = ("belief", "classifier")
 TARGETS = ("goal", "square")
+DIRECT_PATHS = ("diffraction", "transmission")
 
 
 class BeliefAgent(PlannerAgent):
@@ -59,11 +60,12 @@ class BeliefAgent(PlannerAgent):
         the agent then stops at the likeliest square, for protocols with Stop.
     stop_half_life : float or None
         Actions after which `stop_above` has halved, more than 0; None for never.
+    direct_path : {"diffraction", "transmission"}
+        How it believes that sound arrives: along the shortest path of the map, or in a straight
+        line through what is between; see `AcousticsConfig`.
     **planner
         Other parameters of `PlannerAgent`, without those of its source filter.
     """
-
-    uses_sound_graph = True
 
     def __init__(
         self,
@@ -77,6 +79,7 @@ class BeliefAgent(PlannerAgent):
         target: str = "goal",
         silent_after: int = 8,
         stop_half_life: float | None = None,
+        direct_path: str = "diffraction",
         **planner: Any,
     ) -> None:
         super().__init__(mapper, stop_at=stop_at, **planner)
@@ -100,6 +103,11 @@ class BeliefAgent(PlannerAgent):
             )
         if not least_information >= 0:
             raise UserError(f"planner.least_information: {least_information}; give nats, 0 or more")
+        if direct_path not in DIRECT_PATHS:
+            raise UserError(
+                f"planner.direct_path: '{direct_path}' is none of {', '.join(DIRECT_PATHS)}"
+            )
+        self.direct_path, self.uses_sound_graph = direct_path, direct_path == "diffraction"
         self.confirm, self.stop_half_life = confirm, stop_half_life
         self.least_information = least_information
         self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
@@ -154,6 +162,8 @@ class BeliefAgent(PlannerAgent):
     @property
     def _sound_cost(self) -> NDArray[np.float32] | None:
         """Costs of the squares for sound; None where they are those of the agent."""
+        if self.direct_path == "transmission":
+            return np.ones_like(self.mapper.graph.cost)
         graph = self.mapper.sound_graph
         return None if graph is None else graph.cost
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -79,7 +79,7 @@ class PlannerAgent(Agent):
     """
 
     # whether it plans by the paths of sound, `Mapper.sound_graph`
-    uses_sound_graph: ClassVar[bool] = False
+    uses_sound_graph: bool = False
 
     def __init__(
         self,
