@@ -1,9 +1,11 @@
 """Speed of the posterior of `belief`, beside the plain planner's belief and beside scipy.
 
 500 episodes of a hand-drawn flat on a map of 101 x 101 squares, in one batch. Each step of the row
-`belief` hears, scores every square and plans; each step of the plain planner filters its estimates
-and plans in the same episodes. The lengths of the fields are compared with those of the compiled
-Dijkstra search of scipy on the same graphs, which knows no direction and is called once a field.
+`belief`, with its settings, maps, hears, scores every square and plans; each step of the plain
+planner maps, filters its estimates and plans in the same episodes. The update of the posterior
+(hearing, and scoring every square) is also timed alone. The lengths of the fields are compared with
+those of the compiled Dijkstra search of scipy on the same graphs, which knows no direction and is
+called once a field.
 
     python benchmarks/belief.py
 """
@@ -23,13 +25,16 @@ from avn.agents.belief_agent import BeliefAgent
 from avn.agents.planner_agent import PlannerAgent
 from avn.agents.rollout import Labels, rollout_scene
 from avn.apartments.local_patch import window_cells
+from avn.config.python import compose_command
 from avn.core.heard import bearing_label
+from avn.core.settings import plain
 from avn.dataset.source_locations import relative_locations
 from avn.mapping.occupancy_mapper import OccupancyMapper
 from avn.navigation.episodes import frozen_episodes
 from avn.navigation.navigation_scene import DrawnScene, draw
 from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
+from avn.planning.settings import ArrivalModel
 from avn.planning.sound_fields import DIAGONAL, STRAIGHT, UNREACHED, SoundFields
 
 FLAT = """
@@ -46,7 +51,7 @@ ccc###ccc#ddddDdd
 cccccccccccdddddd
 cc##ccccC#ddddddd
 """
-EPISODES, SIZE, BINS = 500, 101, 72
+EPISODES, SIZE, BINS, STEPS = 500, 101, 72, 60
 REGIME = AcousticsConfig("diffraction", "diffraction")
 
 
@@ -67,6 +72,26 @@ def observed(scene: DrawnScene) -> SceneObservations:
     return SceneObservations(audio, {"local_patch": patches})
 
 
+class TimedBelief(BeliefAgent):
+    """Agent of the row `belief` that adds up the seconds of the updates of its posterior."""
+
+    updating = 0.0
+
+    def _update_source(self, observation, active) -> None:
+        start = time.perf_counter()
+        super()._update_source(observation, active)
+        self.updating += time.perf_counter() - start
+
+
+def row_belief() -> TimedBelief:
+    """Return the agent of the row `belief` on true local patches."""
+    cfg, _ = compose_command("eval", ["agent=belief", "acoustics=diffraction"])
+    settings = plain(cfg, "planner")
+    model = ArrivalModel(**settings.pop("model"))
+    own = {key: value for key, value in settings.items() if key not in ("_target_", "name")}
+    return TimedBelief(OccupancyMapper(SIZE), model, **own)
+
+
 def steps_a_second(agent: PlannerAgent, scene: DrawnScene, seen: SceneObservations) -> float:
     """Return the steps of the whole batch that an agent takes in a second."""
     protocol = Protocol("stop", "radius", True, "metres", num_starts=100, max_actions=100)
@@ -76,11 +101,13 @@ def steps_a_second(agent: PlannerAgent, scene: DrawnScene, seen: SceneObservatio
     seconds: list[float] = []
     for _ in range(2):  # the first one compiles
         taken = 0
+        if isinstance(agent, TimedBelief):
+            agent.updating = 0.0
 
         def count(simulator, agent, observation, actions) -> bool:
             nonlocal taken
             taken += actions is not None and not bool(simulator.done.all())
-            return taken >= 60
+            return taken >= STEPS
 
         start = time.perf_counter()
         rollout_scene(agent, scene, episodes, protocol, labels, seen, count)
@@ -141,11 +168,16 @@ def main() -> None:
     """Print the rates, their ratios and the peak memory."""
     scene = draw("flat", FLAT)
     seen = observed(scene)
-    belief = steps_a_second(BeliefAgent(OccupancyMapper(SIZE)), scene, seen)
+    agent = row_belief()
+    belief = steps_a_second(agent, scene, seen)
+    updates = STEPS / agent.updating
     plain = steps_a_second(
         PlannerAgent(OccupancyMapper(SIZE), source_filter="bayes"), scene, seen_with_stop(seen)
     )
-    print(f"belief, {EPISODES} episodes: {belief:.1f} steps of the batch a second")
+    print(
+        f"belief, {EPISODES} episodes, evidence of {agent.model.places} squares: {belief:.1f} "
+        f"steps of the batch a second; the posterior alone {updates:.1f} updates a second"
+    )
     print(f"plain planner, the same episodes: {plain:.1f}; belief takes {plain / belief:.1f} x")
     own, repaired, peer = fields_a_second(scene)
     print(

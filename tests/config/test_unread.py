@@ -102,6 +102,8 @@ def test_so_do_the_other_commands(command, tmp_path, arguments, key):
         ("agent=random_walk", "sound=alarm"),
         ("agent=oracle", "protocol=stop", "protocol.radius=2"),
         ("agent=plan_noexp", "mapper.visible_above=0.3"),
+        # the mapper alone would change nothing here, but it comes with another network
+        ("agent=belief", "acoustics=resonance", "mapper=occupancy"),
         ("agent=random_walk", "protocol.cap=goal"),
         ("agent=a3c_va", "protocol.cap=goal"),
         ("agent=ours_exp", "mapper.heading=vote"),

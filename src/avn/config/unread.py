@@ -59,12 +59,17 @@ def refuse_unread(
     default = _default(command, *chosen)
     for override in suspects:
         key = _key(override)
-        if not leaves(cfg, [key]):  # sets keys of other nodes, such as debug=overfit
-            alone = compose(command, overrides=[*chosen, str(override.input_line)])
-            for unread in sorted(_changed(alone, default, [*alone]) - set(read)):
-                raise _unread(command, unread, cfg, read)
+        elsewhere = not leaves(cfg, [key])  # sets keys of other nodes, such as debug=overfit
         changed = _changed(cfg, default, [key])
-        if changed and not changed & set(read):
+        if not elsewhere and (not changed or changed & set(read)):
+            continue
+        alone = compose(command, overrides=[*chosen, str(override.input_line)])
+        effects = _changed(alone, default, [*alone])
+        for unread in sorted(effects - set(read)) if elsewhere else ():
+            raise _unread(command, unread, cfg, read)
+        # an option may choose one of another group too, as those of `mapper` do
+        effects &= _changed(cfg, default, [*cfg])
+        if effects and not effects & set(read):
             raise _unread(command, key, cfg, read)
 
 
