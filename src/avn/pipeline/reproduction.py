@@ -145,28 +145,30 @@ class _Rows:
 
     def __init__(self, runs: Sequence[Evaluation], names: Sequence[str], board: Dashboard) -> None:
         self._left, self._board = list(zip(runs, names, strict=True)), board
-        self._finished: dict[str, list[Path]] = {}
+        self._finished: dict[str, list[pd.Series]] = {}
         self._started = time.monotonic()
 
     def fill(self) -> None:
         """Add the next runs that are finished."""
         while self._left and self._left[0][0].done():
             run, row = self._left.pop(0)
-            folders = self._finished.setdefault(row, [])
-            folders.append(run.folder)
-            self._board.fill(row, _average(folders))
+            finished = self._finished.setdefault(row, [])
+            finished.append(_averages(run.folder))
+            mean = 100.0 * pd.DataFrame(finished).mean()
+            average = f"{mean['sr']:.1f} / {mean['spl']:.1f}"
+            self._board.fill(row, average)
             if row not in [left for _, left in self._left]:
                 passed = format_duration(time.monotonic() - self._started)
-                log(f"{row}: {_average(folders)} after {passed}")
+                log(f"{row}: {average} after {passed}")
 
 
-def _average(folders: Sequence[Path]) -> str:
-    """Return success rate and SPL of some runs in percent, over all sounds and scenes."""
-    runs = pd.concat([results.summarise(read_episodes(folder), draws=0) for folder in folders])
-    average = runs[runs["scene"] == results.AVERAGE]
+def _averages(folder: Path) -> pd.Series:
+    """Return success rate and SPL of a run over all sounds and scenes."""
+    run = results.summarise(read_episodes(folder), draws=0)
+    average = run[run["scene"] == results.AVERAGE]
     all_sounds = average[average["sound"] == results.ALL_SOUNDS]
-    mean = 100.0 * (all_sounds if len(all_sounds) else average)[["sr", "spl"]].mean()
-    return f"{mean['sr']:.1f} / {mean['spl']:.1f}"
+    mean: pd.Series = (all_sounds if len(all_sounds) else average)[["sr", "spl"]].mean()
+    return mean
 
 
 def runs_of(cfg: DictConfig, composed: DictConfig) -> list[DictConfig]:

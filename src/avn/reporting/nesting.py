@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from avn.core.errors import UserError
 from avn.reporting.bootstrap import Nested
@@ -33,12 +34,12 @@ def nested(episodes: pd.DataFrame, columns: Sequence[str]) -> Nested:
     """
     networks = [NETWORK] if NETWORK in episodes else []
     ordered = episodes.sort_values([*_START, *networks, "sound"], kind="stable")
-    start = ordered.groupby(_START, sort=True).ngroup().to_numpy()
-    source = ordered.groupby(["scene", "source"], sort=True).ngroup().to_numpy()
-    scene = ordered.groupby("scene", sort=True).ngroup().to_numpy()
+    start = _numbered(ordered[_START])
+    source = _numbered(ordered[["scene", "source"]])
+    scene = _numbered(ordered[["scene"]])
     network = np.zeros_like(start)
     if networks:
-        network = ordered.groupby(NETWORK, sort=True).ngroup().to_numpy()
+        network = np.unique(ordered[NETWORK], return_inverse=True)[1]
     count = int(network.max()) + 1
     cell = start * count + network
     sizes = np.bincount(cell, minlength=(start[-1] + 1) * count).reshape(-1, count)
@@ -54,3 +55,12 @@ def nested(episodes: pd.DataFrame, columns: Sequence[str]) -> Nested:
         source=own.astype(np.int64),
         scene=scene[places][np.flatnonzero(np.diff(own, prepend=-1))].astype(np.int64),
     )
+
+
+def _numbered(ordered: pd.DataFrame) -> NDArray[np.int64]:
+    """Return the number of the group of equal rows of each row of a sorted table, (N,)."""
+    changed = np.zeros(len(ordered), dtype=np.bool_)
+    for name in ordered:
+        values = ordered[name].to_numpy()
+        changed[1:] |= values[1:] != values[:-1]
+    return np.cumsum(changed, dtype=np.int64)
