@@ -68,8 +68,7 @@ def refuse_unread(
         for unread in sorted(effects - set(read)) if elsewhere else ():
             raise _unread(command, unread, cfg, read)
         # an option may choose one of another group too, as those of `mapper` do
-        effects &= _changed(cfg, default, [*cfg])
-        if effects and not effects & set(read):
+        if effects and not effects & _changed(cfg, default, [*cfg]) & set(read):
             raise _unread(command, key, cfg, read)
 
 
