@@ -51,7 +51,7 @@ ccc###ccc#ddddDdd
 cccccccccccdddddd
 cc##ccccC#ddddddd
 """
-EPISODES, SIZE, BINS, STEPS = 500, 101, 72, 60
+EPISODES, SIZE, BINS = 500, 101, 72
 REGIME = AcousticsConfig("diffraction", "diffraction")
 
 
@@ -73,14 +73,17 @@ def observed(scene: DrawnScene) -> SceneObservations:
 
 
 class TimedBelief(BeliefAgent):
-    """Agent of the row `belief` that adds up the seconds of the updates of its posterior."""
+    """Agent of the row `belief` that times the updates of its posterior."""
 
-    updating = 0.0
+    def reset(self, n, generator, protocol) -> None:
+        """Begin N new episodes, and forget the times."""
+        super().reset(n, generator, protocol)
+        self.seconds: list[float] = []
 
     def _update_source(self, observation, active) -> None:
         start = time.perf_counter()
         super()._update_source(observation, active)
-        self.updating += time.perf_counter() - start
+        self.seconds.append(time.perf_counter() - start)
 
 
 def row_belief() -> TimedBelief:
@@ -101,13 +104,11 @@ def steps_a_second(agent: PlannerAgent, scene: DrawnScene, seen: SceneObservatio
     seconds: list[float] = []
     for _ in range(2):  # the first one compiles
         taken = 0
-        if isinstance(agent, TimedBelief):
-            agent.updating = 0.0
 
         def count(simulator, agent, observation, actions) -> bool:
             nonlocal taken
             taken += actions is not None and not bool(simulator.done.all())
-            return taken >= STEPS
+            return taken >= 60
 
         start = time.perf_counter()
         rollout_scene(agent, scene, episodes, protocol, labels, seen, count)
@@ -170,15 +171,15 @@ def main() -> None:
     seen = observed(scene)
     agent = row_belief()
     belief = steps_a_second(agent, scene, seen)
-    updates = STEPS / agent.updating
-    plain = steps_a_second(
+    updates = len(agent.seconds) / sum(agent.seconds)
+    planner = steps_a_second(
         PlannerAgent(OccupancyMapper(SIZE), source_filter="bayes"), scene, seen_with_stop(seen)
     )
     print(
         f"belief, {EPISODES} episodes, evidence of {agent.model.places} squares: {belief:.1f} "
         f"steps of the batch a second; the posterior alone {updates:.1f} updates a second"
     )
-    print(f"plain planner, the same episodes: {plain:.1f}; belief takes {plain / belief:.1f} x")
+    print(f"plain planner, the same episodes: {planner:.1f}; belief takes {planner / belief:.1f} x")
     own, repaired, peer = fields_a_second(scene)
     print(
         f"fields: {own:,.0f} a second with directions; scipy, lengths alone: {peer:,.0f} (same "
