@@ -243,3 +243,42 @@ def test_near_answers_for_active_agents_alone():
     active = np.array([True, False, True])
     every, some = belief.near(position, offsets), belief.near(position, offsets, active)
     assert np.array_equal(some, np.where(active, every, 0))
+
+
+def test_a_neglected_tail_leaves_the_likely_squares_as_they_are():
+    poses, source = [(12, 12, 0), (13, 12, 1), (14, 12, 1), (15, 12, 1)], (17, 17)
+    exact, neglecting = (ArrivalBelief(1, SIZE, BINS, ArrivalModel(tail=t)) for t in (0, 1e-3))
+    for pose in poses:
+        for belief in (exact, neglecting):
+            belief.hear(np.array([pose]), *heard(rooms(), pose, source), ALL)
+            belief.score(rooms(), ALL)
+    scored = np.isfinite(neglecting.log_belief)
+    assert np.array_equal(neglecting.log_belief[scored], exact.log_belief[scored])
+    share = np.exp(exact.log_belief.astype(np.float64))
+    assert 1 - share[scored].sum() / share.sum() < 1e-3
+    assert scored.sum() < np.isfinite(exact.log_belief).sum() / 2
+
+
+def test_a_source_that_was_heard_too_near_is_found_farther_away():
+    cost, far = np.ones((1, SIZE, SIZE), np.float32), (38, 20)
+    belief = ArrivalBelief(1, SIZE, BINS, ArrivalModel(kept=0.5, tail=0.01))
+    for x in range(2, 12):
+        pose = (x, 20, 1)
+        belief.hear(np.array([pose]), *heard(cost, pose, (x + 2, 20) if x < 5 else far), ALL)
+        belief.score(cost, ALL)
+        if x == 4:
+            assert not np.isfinite(belief.log_belief[0, 20, 38])
+    assert np.abs(belief.targets(cost, ALL)[0] - far).max() <= 1
+
+
+def test_where_all_that_is_near_was_searched_the_rest_is_scored():
+    cost, pose = np.ones((1, SIZE, SIZE), np.float32), (5, 20, 1)
+    belief = ArrivalBelief(1, SIZE, BINS, ArrivalModel(tail=0.01))
+    for _ in range(5):
+        belief.hear(np.array([pose]), *heard(cost, pose, (8, 20)), ALL)
+        belief.score(cost, ALL)
+    belief.searched |= np.isfinite(belief.log_belief)
+    belief.score(cost, ALL)
+    x, y = belief.targets(cost, ALL)[0]
+    assert belief.searched.any(), "the search has not begun again"
+    assert not belief.searched[0, y, x]

@@ -150,3 +150,27 @@ def test_a_forgotten_place_has_the_field_of_its_new_position():
     assert fields.length[0, 0, 3, 7] == 0
     assert np.array_equal(fields.length[0, 0], whole_search(cost[0], (7, 3), 60)[0])
     assert np.array_equal(fields.length[0, 1], kept)
+
+
+@pytest.mark.parametrize("kind", ["free", "unknown", "beliefs"])
+def test_fields_up_to_a_length_are_those_of_a_whole_search(kind):
+    rng, palette, count = np.random.default_rng(5), PALETTES[kind], 4
+    rows, every = np.zeros(count, np.int64), np.ones((1, count), np.bool_)
+    fields, places = SoundFields(1, count, SIZE, 60, BINS), rng.integers(0, SIZE, (1, count, 2))
+    blocked = np.zeros((1, SIZE, SIZE), np.bool_)
+    for i, cost in enumerate(changing_maps(rng, palette, palette[-1], 40)):
+        slot, most = rng.integers(0, count), rng.integers(1, 80)
+        x, y = places[0, slot]
+        if i % 5 == 4:
+            places[0, slot] = x, y = rng.integers(0, SIZE, 2)
+            fields.forget(rows[:1], np.array([slot]))
+        cost[0, y, x] = 1
+        if np.array_equal(np.isinf(cost), blocked):
+            continue  # costs alone do not outdate a field
+        blocked = np.isinf(cost)
+        fields.update(cost, places, every, every[:, 0], (np.array([slot]), np.array([most])))
+        near = whole_search(cost[0], (x, y), 60)[0] <= most
+        for k, place in enumerate(places[0]):
+            expected = whole_search(cost[0], place, 60)
+            assert np.array_equal(fields.length[0, k][near], expected[0][near])
+            assert np.array_equal(fields.direction[0, k][near], expected[1][near])

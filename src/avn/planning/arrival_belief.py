@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from avn.core.actions import HEADINGS
+from avn.planning.field_state import STRAIGHT
 from avn.planning.posterior import best_around, likely, parts, score
 from avn.planning.searched import Searched
 from avn.planning.settings import ArrivalModel
@@ -55,7 +56,11 @@ class ArrivalBelief(Searched):
         self._bearing = np.zeros((n, slots, HEADINGS, bins), dtype=np.float32)
         self._distance = np.zeros((n, slots, HEADINGS, 2), dtype=np.float32)
         self._count = np.zeros((n, slots, HEADINGS), dtype=np.float32)
+        # log-probability of each direction, summed over the headings
+        self._direction = np.zeros((n, slots, bins), dtype=np.float32)
         self._fields = SoundFields(n, slots, size, model.reach, bins)
+        # length of the paths from the newest place that are followed
+        self._followed = np.full(n, model.reach * STRAIGHT, dtype=np.int64)
 
     def hear(
         self,
@@ -98,6 +103,7 @@ class ArrivalBelief(Searched):
         self._bearing[heard] += np.take_along_axis(bearing[rows], turned, 1)
         self._distance[heard] += distance[rows]
         self._count[heard] += 1
+        self._direction[heard[:2]] = self._directions(*heard[:2])
 
     def _see(self, pose: NDArray[np.int64], active: NDArray[np.bool_]) -> None:
         """Note where the agents are, and the headings that they had there."""
@@ -126,40 +132,69 @@ class ArrivalBelief(Searched):
         sound_cost : (N, M, M) float32, optional
             Costs of the squares for sound; `cost` by default.
         """
-        kept = (self._weight > _LEAST_WEIGHT) & active[:, None]
         heard_through = cost if sound_cost is None else sound_cost
-        self._fields.update(heard_through, self._position, kept, active)
+        length = self._score(cost, active, heard_through)
+        if self.model.tail == 0:
+            return
+        most = self.model.reach * STRAIGHT
+        lost = active & (length < 0) & (self._followed < most)
+        if lost.any():
+            # nothing is left of what was followed
+            self._followed[lost] = most
+            length = np.where(lost, self._score(cost, lost, heard_through), length)
+        # twice as far where the posterior ends where it was cut off
+        cut = length >= self._followed - STRAIGHT
+        farther = np.where(cut, 2 * self._followed, length + length // 4) + 3 * STRAIGHT
+        wanted = np.where(length < 0, most, np.maximum(farther, self._followed // 2))
+        self._followed[active] = np.minimum(wanted, most)[active]
+
+    def _score(
+        self,
+        cost: NDArray[np.float32],
+        active: NDArray[np.bool_],
+        sound_cost: NDArray[np.float32],
+    ) -> NDArray[np.int64]:
+        """Compute the posterior where paths are followed; see `posterior.score`."""
+        kept = (self._weight > _LEAST_WEIGHT) & active[:, None]
+        around = self._newest, self._followed
+        self._fields.update(sound_cost, self._position, kept, active, around)
         row, slot = np.nonzero(kept)
         bearing = np.zeros((*kept.shape, self.bins + 2), dtype=np.float32)
         log_length, precision = (np.zeros(kept.shape, dtype=np.float32) for _ in range(2))
         bearing[row, slot] = self._bearing_terms(row, slot)
         log_length[row, slot], precision[row, slot] = self._length_terms(row, slot)
-        score(
+        beyond = score(
             self.log_belief,
             cost,
             self.searched,
             active,
             kept,
             self._here,
-            self.model.reach,
-            self.model.bias,
+            (self.model.reach, self.model.bias, self.model.tail),
+            around,
             self._fields.framed,
             (bearing, log_length, precision),
         )
+        return np.asarray(beyond)
+
+    def _directions(self, row: NDArray[np.int64], slot: NDArray[np.int64]) -> NDArray[Any]:
+        """Return the log-probability of each direction, summed over the headings, (R, B)."""
+        count, blur = self._count[row, slot], self.model.blur
+        mean = self._bearing[row, slot] / np.maximum(count, 1)[..., None]
+        terms = np.log((1 - blur) * np.exp(mean) + blur / self.bins)
+        return (terms * (count > 0)[..., None]).sum(1)
 
     def _bearing_terms(self, row: NDArray[np.int64], slot: NDArray[np.int64]) -> NDArray[Any]:
         """Return the weighted log-probability of each direction, of none, and beyond, (R, B + 2).
 
         A source where it is heard has no direction: all are as likely.
         """
-        count, model = self._count[row, slot], self.model
-        mean = self._bearing[row, slot] / np.maximum(count, 1)[..., None]
-        terms = np.log((1 - model.blur) * np.exp(mean) + model.blur / self.bins)
-        summed = (terms * (count > 0)[..., None]).sum(1)
-        headings = (count > 0).sum(1).astype(np.float32)
+        model = self.model
+        headings = (self._count[row, slot] > 0).sum(1).astype(np.float32)
         part = headings ** -np.float32(model.shared_by_headings or 0.0)
         weight = (model.bearing_weight * part * self._weight[row, slot])[:, None]
-        terms, none = weight * summed, weight * headings[:, None] * -np.float32(np.log(self.bins))
+        terms = weight * self._direction[row, slot]
+        none = weight * headings[:, None] * -np.float32(np.log(self.bins))
         # beyond the reach is less likely than the least likely direction
         return np.concatenate((terms, none, terms.min(1, keepdims=True) - 5), 1)
 

@@ -34,38 +34,22 @@ from avn.planning.field_state import (
     UNREACHED,
     WAITING,
 )
-from avn.planning.field_ways import RIGHT, UP, choose_ways, is_shut
+from avn.planning.field_ways import ONWARD, RIGHT, UP, choose_ways, is_shut
 from avn.planning.sight import is_clear, shade
-
-# Neighbours to which a path goes on that came along each of the eight steps, and from the start:
-# the others are nearer to the square before.
-_ONWARD = np.array(
-    [
-        [0, 1, 2, 3, 5, -1, -1, -1],
-        [0, 1, 2, 3, 4, -1, -1, -1],
-        [0, 1, 2, 4, 7, -1, -1, -1],
-        [0, 1, 3, 5, 6, -1, -1, -1],
-        [1, 2, 4, 6, 7, -1, -1, -1],
-        [0, 3, 5, 6, 7, -1, -1, -1],
-        [3, 4, 5, 6, 7, -1, -1, -1],
-        [2, 4, 5, 6, 7, -1, -1, -1],
-        [0, 1, 2, 3, 4, 5, 6, 7],
-    ]
-)
 
 
 @numba.njit(cache=True)
-def new_workspace(squares, reach):  # type: ignore[no-untyped-def]
+def new_workspace(squares, most):  # type: ignore[no-untyped-def]
     """Return memory for searches.
 
     Parameters
     ----------
     squares : int
         W^2, squares of the map with its margin.
-    reach : int
-        Squares up to which paths are followed.
+    most : int
+        Greatest length up to which paths are followed.
     """
-    levels = reach * STRAIGHT + LONGEST + 2
+    levels = most + LONGEST + 2
     return (
         np.full(levels, -1, dtype=np.int32),  # newest entry of the queue at each length
         np.empty((10 * squares, 2), dtype=np.int32),  # entries: square, and next entry
@@ -76,8 +60,11 @@ def new_workspace(squares, reach):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type: ignore[no-untyped-def]
+def repair(field, steps, start, most, bins, aims, changes, workspace):  # type: ignore[no-untyped-def]
     """Repair a field after changes of the map, in place.
+
+    The field is right up to the length `most`, which may be less than at the last repair, but not
+    more. Squares beyond have any greater length.
 
     Parameters
     ----------
@@ -87,7 +74,9 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
         Units of a straight and of a diagonal step to each square, 0 if it is blocked.
     start : int
         Flat index of the square from which the field is seen.
-    reach, bins : int
+    most : int
+        Greatest length up to which paths are followed.
+    bins : int
         See `SoundFields`.
     aims : (2 M - 1, 2 M - 1) uint8
         Direction of each offset from the start, in rows and columns.
@@ -98,9 +87,11 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
     """
     length, direction, state = field
     heads, entries, mark, listed, rows = workspace
-    width, most = int(np.sqrt(len(length))), reach * STRAIGHT
+    width = int(np.sqrt(len(length)))
     mark[:] = RESTING
-    count = _invalidate(length, direction, state, steps, start, bins, changes, mark, listed, width)
+    count = _invalidate(
+        length, direction, state, steps, start, most, bins, changes, mark, listed, width
+    )
     used = 0
     if count < 0:
         length[:], direction[:] = UNREACHED, bins + 1
@@ -114,7 +105,9 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
         used = _seed(length, steps, most, mark, listed[:count], heads, entries, width)
     count = 0
     for blocked in (False, True):
-        count = shade(steps, start, reach, width, state, changes, blocked, listed, count)
+        count = shade(
+            steps, start, most // STRAIGHT + 1, width, state, changes, blocked, listed, count
+        )
     for square in listed[:count]:
         hidden = state[square] & (BENT | SIGHT) == BENT | DARK
         if not hidden and mark[square] == RESTING and length[square] <= most:
@@ -128,12 +121,16 @@ def repair(field, steps, start, reach, bins, aims, changes, workspace):  # type:
 
 @numba.njit(cache=True)
 def _invalidate(  # type: ignore[no-untyped-def]
-    length, direction, state, steps, start, bins, changes, mark, listed, width
+    length, direction, state, steps, start, most, bins, changes, mark, listed, width
 ):
     """Invalidate what changed, and all paths through it; return the number, or -1 if many."""
-    count, most = 0, 2 * len(length) // 3
+    count, many = 0, 2 * len(length) // 3
+    # what is farther is not brought within `most` by the change of its own step
+    most += LONGEST
     for change in changes:
         square = change >> 1
+        if not change & 1 and length[square] > most:
+            continue
         if square != start and mark[square] != INVALID:
             mark[square], listed[count] = INVALID, square
             count += 1
@@ -147,7 +144,7 @@ def _invalidate(  # type: ignore[no-untyped-def]
                 if steps[0, square] > 0 or (way < NOWHERE and is_shut(steps, there, way, width)):
                     mark[there], listed[count] = INVALID, there
                     count += 1
-        if count > most:
+        if count > many:
             return -1
     i = 0
     while i < count:
@@ -156,10 +153,10 @@ def _invalidate(  # type: ignore[no-untyped-def]
         state[square] = (state[square] & SIGHT) | NOWHERE
         for k in range(8):
             there = square + UP[k] * width + RIGHT[k]
-            if state[there] & FROM == k and mark[there] != INVALID:
+            if state[there] & FROM == k and mark[there] != INVALID and length[there] <= most:
                 mark[there], listed[count] = INVALID, there
                 count += 1
-        if count > most:
+        if count > many:
             return -1
         i += 1
     return count
@@ -262,7 +259,7 @@ def _spread(length, state, steps, now, most, mark, heads, entries, first, used, 
         if length[square] != now or (news != CHANGED and news != TURNED):
             continue
         for i in range(8):
-            k = _ONWARD[way, i]
+            k = ONWARD[way, i]
             if k < 0:
                 break
             there = square + UP[k] * width + RIGHT[k]

@@ -10,6 +10,21 @@ from avn.planning.field_state import BENT, CHANGED, FROM, KNOWN, LOOKING, NOWHER
 # Columns and rows from a square to its neighbours.
 RIGHT = np.array([-1, 0, 1, -1, 1, -1, 0, 1])
 UP = np.array([-1, -1, -1, 0, 0, 1, 1, 1])
+# Neighbours to which a path goes on that came along each of the eight steps, and from the start:
+# the others are nearer to the square before.
+ONWARD = np.array(
+    [
+        [0, 1, 2, 3, 5, -1, -1, -1],
+        [0, 1, 2, 3, 4, -1, -1, -1],
+        [0, 1, 2, 4, 7, -1, -1, -1],
+        [0, 1, 3, 5, 6, -1, -1, -1],
+        [1, 2, 4, 6, 7, -1, -1, -1],
+        [0, 3, 5, 6, 7, -1, -1, -1],
+        [3, 4, 5, 6, 7, -1, -1, -1],
+        [2, 4, 5, 6, 7, -1, -1, -1],
+        [0, 1, 2, 3, 4, 5, 6, 7],
+    ]
+)
 
 
 @numba.njit(cache=True)

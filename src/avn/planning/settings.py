@@ -82,6 +82,11 @@ class ArrivalModel:
         along the way.
     reach : int
         Length up to which paths are followed, in squares, 1 to 1000.
+    tail : float
+        Share of the posterior that may be neglected for speed, 0 to 0.5. Squares are scored up to a
+        length of the path from the newest place: that beyond which less than this share lay in the
+        step before, a quarter more, and 3 squares. It doubles where the posterior reaches it. At 0,
+        all squares within `reach` are scored.
 
     Raises
     ------
@@ -98,6 +103,7 @@ class ArrivalModel:
     least_sigma: float = 0.1
     bias: float = 0.0
     reach: int = 60
+    tail: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the settings."""
@@ -111,6 +117,7 @@ class ArrivalModel:
             "least_sigma": (1e-3, 10),
             "bias": (0, 10),
             "reach": (1, 1000),
+            "tail": (0, 0.5),
         }
         for key, (least, most) in limits.items():
             value = getattr(self, key)

@@ -18,8 +18,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from avn.planning.field_changes import differences, missed, note_changes, units
 from avn.planning.field_search import new_workspace, repair
-from avn.planning.field_state import DIAGONAL, LONGEST, NOWHERE, STRAIGHT, UNKNOWN, UNREACHED
+from avn.planning.field_state import DIAGONAL, NOWHERE, STRAIGHT, UNKNOWN, UNREACHED
 
 __all__ = ["DIAGONAL", "SQUARES", "STRAIGHT", "UNREACHED", "SoundFields", "sound_fields"]
 
@@ -71,6 +72,8 @@ class SoundFields:
         self._known = np.full((n, places), -1, dtype=np.int64)
         # whether no square has become a node, or is none any more, since a field was computed
         self._valid = np.zeros((n, places), dtype=np.bool_)
+        # length up to which each field is right
+        self._limit = np.full((n, places), reach * STRAIGHT, dtype=np.int64)
         self._aims = _aims(size, bins)
         self._plain: tuple[Any, ...] | None = None
 
@@ -84,6 +87,7 @@ class SoundFields:
         position: NDArray[np.int64],
         wanted: NDArray[np.bool_],
         active: NDArray[np.bool_],
+        around: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None,
     ) -> None:
         """Bring fields up to date.
 
@@ -102,21 +106,33 @@ class SoundFields:
             Fields to bring up to date.
         active : (N,) bool
             Agents whose maps may have changed; `wanted` is of these.
+        around : pair of (N,) int64, optional
+            One of the K places of each agent, and a length in units of `SQUARES`: only the squares
+            to which the path from this place is no longer are brought up to date, and the values of
+            others are undefined. By default all are.
         """
-        flipped = _compare(cost, self._cost, self._steps, self._changes, self._changed, active)
+        flipped = note_changes(cost, self._cost, self._steps, self._changes, self._changed, active)
         self._valid[flipped] = False
-        row, slot = np.nonzero(wanted & ~self._valid)
+        most = self.reach * STRAIGHT
+        if around is None:
+            around = np.zeros(len(cost), dtype=np.int64), np.full(len(cost), most)
+        rows = np.arange(len(cost))
+        x, y = np.moveaxis(position[rows, around[0]], -1, 0)
+        # no path from one place is longer than that over another place
+        needed = np.minimum(self.length[rows, :, y, x] + around[1][:, None], most)
+        row, slot = np.nonzero(wanted & (~self._valid | (needed > self._limit)))
         if not len(row):
             return
         if self._plain is None:
             self._plain = self._uniform(cost[row[0], 0, 0])
         _update(
-            (*self.framed, self._state),
+            (*self.framed, self._state, self._limit),
             self._steps,
             (self._changes, self._changed, self._known),
             (row, slot),
             position,
-            (self.reach, self.bins),
+            around,
+            (most, self.bins),
             self._aims,
             self._plain,
             4 * numba.get_num_threads(),
@@ -127,7 +143,7 @@ class SoundFields:
         """Return a field without boundaries or walls, from which fields are made, and its steps."""
         width = 2 * self._cost.shape[1] + 1
         steps = np.zeros((2, width, width), dtype=np.uint8)
-        straight, diagonal = _units(cost)
+        straight, diagonal = units(cost)
         steps[0, 1:-1, 1:-1], steps[1, 1:-1, 1:-1] = straight, diagonal
         length = np.zeros((width, width), dtype=np.int16)
         direction, state = (np.zeros((width, width), dtype=np.uint8) for _ in range(2))
@@ -135,8 +151,9 @@ class SoundFields:
         everything = 2 * np.arange(width * width)
         flat = length.ravel(), direction.ravel(), state.ravel()
         start, aims = width * width // 2, _aims(width - 2, self.bins)
-        work = new_workspace(width * width, self.reach)
-        repair(flat, steps.reshape(2, -1), start, self.reach, self.bins, aims, everything, work)
+        most = self.reach * STRAIGHT
+        work = new_workspace(width * width, most)
+        repair(flat, steps.reshape(2, -1), start, most, self.bins, aims, everything, work)
         return length, direction, state, straight, diagonal
 
 
@@ -172,121 +189,63 @@ def sound_fields(
 
 @numba.njit(cache=True, parallel=True)
 def _update(  # type: ignore[no-untyped-def]
-    fields, steps, log, chosen, position, limits, aims, plain, parts
+    fields, steps, log, chosen, position, around, limits, aims, plain, parts
 ):
     row, slot = chosen
-    reach, bins = limits
-    changes, changed, known = log
-    width, remembered = steps.shape[2], changes.shape[1]
+    most, bins = limits
+    width, limit = steps.shape[2], fields[3]
     flat = width * width
     parts = min(parts, len(row))
     for part in numba.prange(parts):
-        workspace = new_workspace(flat, reach)
-        listed = np.empty(max(flat, remembered), dtype=np.int32)
+        workspace = new_workspace(flat, most)
+        listed = np.empty(max(flat, log[0].shape[1]), dtype=np.int32)
         for i in range(part, len(row), parts):
             n, k = row[i], slot[i]
             x, y = position[n, k, 0], position[n, k, 1]
-            missed = changed[n] - known[n, k]
-            if known[n, k] < 0 or missed > remembered:
-                _copy_uniform(fields, n, k, x, y, plain)
-                count = _differences(steps[n], plain[3], plain[4], listed)
-            else:
-                count = missed
-                for j in range(missed):
-                    listed[j] = changes[n, (known[n, k] + j) % remembered]
             field = (
                 fields[0][n, k].reshape(flat),
                 fields[1][n, k].reshape(flat),
                 fields[2][n, k].reshape(flat),
             )
             own, start = steps[n].reshape((2, flat)), (y + 1) * width + x + 1
-            repair(field, own, start, reach, bins, aims, listed[:count], workspace)
-            known[n, k] = changed[n]
+            middle, length = position[n, around[0][n]], around[1][n]
+            over = (middle[1] + 1) * width + middle[0] + 1
+            count = missed(log, n, k, listed)
+            needed = length if count < 0 else limit[n, k]
+            if field[0][over] < needed:
+                needed = min(field[0][over] + length, most)
+            while True:
+                # a little farther, as the next ones may have to be
+                reached = min(needed + needed // 8 + 2 * STRAIGHT, most)
+                if count < 0 or needed > limit[n, k]:
+                    _copy_uniform(fields, n, k, x, y, plain)
+                    count = differences(steps[n], plain[3], plain[4], listed)
+                    limit[n, k] = reached
+                limit[n, k] = min(limit[n, k], reached)
+                repair(field, own, start, limit[n, k], bins, aims, listed[:count], workspace)
+                needed, count = min(field[0][over] + length, most), -1
+                if needed <= limit[n, k]:
+                    break
+            log[2][n, k] = log[1][n]
 
 
 @numba.njit(cache=True)
 def _copy_uniform(fields, n, k, x, y, plain):  # type: ignore[no-untyped-def]
     """Set a field to the part of the uniform one around its start, which is in the middle."""
     size = fields[0].shape[2] - 2
-    length, direction, state = fields[0][n, k], fields[1][n, k], fields[2][n, k]
     left = size - x
     for row in range(size):
-        lengths, directions, states = (
-            plain[0][size - y + row],
-            plain[1][size - y + row],
-            plain[2][size - y + row],
-        )
-        for column in range(size):
-            length[row + 1, column + 1] = lengths[left + column]
-        for column in range(size):
-            direction[row + 1, column + 1] = directions[left + column]
-        for column in range(size):
-            state[row + 1, column + 1] = states[left + column]
+        above = size - y + row
+        _copy(fields[0][n, k, row + 1, 1:-1], plain[0][above, left : left + size])
+        _copy(fields[1][n, k, row + 1, 1:-1], plain[1][above, left : left + size])
+        _copy(fields[2][n, k, row + 1, 1:-1], plain[2][above, left : left + size])
 
 
 @numba.njit(cache=True)
-def _differences(steps, straight, diagonal, listed):  # type: ignore[no-untyped-def]
-    """List the squares of a map whose steps are not those of a uniform one; return how many.
-
-    If a diagonal step is as long as a straight one, paths of the uniform map may lie outside of the
-    map, so all squares are listed.
-    """
-    width, count = steps.shape[1], 0
-    every = straight == diagonal and straight > 0
-    for y in range(1, width - 1):
-        differs = every
-        for x in range(1, width - 1):
-            differs |= (steps[0, y, x] != straight) | (steps[1, y, x] != diagonal)
-        if not differs:
-            continue
-        for x in range(1, width - 1):
-            if every or steps[0, y, x] != straight or steps[1, y, x] != diagonal:
-                flipped = (steps[0, y, x] == 0) != (straight == 0)
-                listed[count] = 2 * (y * width + x) + flipped
-                count += 1
-    return count
-
-
-@numba.njit(cache=True, parallel=True)
-def _compare(cost, last, steps, changes, changed, active):  # type: ignore[no-untyped-def]
-    """Note how maps have changed; return where a square was blocked or freed, (N,) bool."""
-    size, width, remembered = cost.shape[1], cost.shape[1] + 2, changes.shape[1]
-    flipped = np.zeros(len(cost), dtype=np.bool_)
-    for n in numba.prange(len(cost)):
-        if not active[n]:
-            continue
-        for y in range(size):
-            differs = False
-            for x in range(size):
-                differs |= cost[n, y, x] != last[n, y, x]
-            if not differs:
-                continue
-            for x in range(size):
-                if cost[n, y, x] == last[n, y, x]:
-                    continue
-                last[n, y, x] = cost[n, y, x]
-                straight, diagonal = _units(cost[n, y, x])
-                before = steps[n, 0, y + 1, x + 1]
-                if straight == before and diagonal == steps[n, 1, y + 1, x + 1]:
-                    continue
-                steps[n, 0, y + 1, x + 1], steps[n, 1, y + 1, x + 1] = straight, diagonal
-                flip = (straight == 0) != (before == 0)
-                flipped[n] |= flip
-                square = (y + 1) * width + x + 1
-                changes[n, changed[n] % remembered] = 2 * square + flip
-                changed[n] += 1
-    return flipped
-
-
-@numba.njit(cache=True)
-def _units(cost):  # type: ignore[no-untyped-def]
-    """Return the units of a straight and of a diagonal step to a square, 0 if it is blocked."""
-    if cost == np.inf:
-        return 0, 0
-    return (
-        min(int(STRAIGHT * cost + 0.5), LONGEST),
-        min(int(DIAGONAL * cost + 0.5), LONGEST),
-    )
+def _copy(target, source):  # type: ignore[no-untyped-def]
+    """Copy a row; over slices, the loop is compiled to one copy."""
+    for i in range(len(target)):
+        target[i] = source[i]
 
 
 @numba.njit(cache=True)
