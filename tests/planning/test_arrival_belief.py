@@ -174,7 +174,9 @@ def test_when_all_was_searched_the_search_begins_again():
     assert not belief.searched.any()
 
 
-@pytest.mark.parametrize(("key", "value"), [("places", 0), ("kept", 1.5), ("blur", 0.0)])
+@pytest.mark.parametrize(
+    ("key", "value"), [("places", 0), ("kept", 1.5), ("blur", 0.0), ("tail", 0.6)]
+)
 def test_settings_out_of_range_are_refused(key, value):
     with pytest.raises(UserError, match=f"planner.model.{key}"):
         ArrivalModel(**{key: value})
