@@ -211,13 +211,14 @@ def _update(  # type: ignore[no-untyped-def]
             middle, length = position[n, around[0][n]], around[1][n]
             over = (middle[1] + 1) * width + middle[0] + 1
             count = missed(log, n, k, listed)
+            # where the middle is not known to be within the limit, the repair shows where it is
             needed = length if count < 0 else limit[n, k]
             if field[0][over] < needed:
                 needed = min(field[0][over] + length, most)
             while True:
                 # a little farther, as the next ones may have to be
                 reached = min(needed + needed // 8 + 2 * STRAIGHT, most)
-                if count < 0 or needed > limit[n, k]:
+                if count < 0 or needed > limit[n, k]:  # a field is never repaired farther
                     _copy_uniform(fields, n, k, x, y, plain)
                     count = differences(steps[n], plain[3], plain[4], listed)
                     limit[n, k] = reached
