@@ -37,8 +37,8 @@ def _evaluate(cfg: DictConfig) -> Path:
     from avn.config.defaults import default_config
     from avn.pipeline import films
     from avn.pipeline.benchmark import headings
+    from avn.pipeline.building import build
     from avn.pipeline.run import Evaluation
-    from avn.pipeline.stage import build
     from avn.reporting.finished_run import show_run
 
     films.check(cfg)

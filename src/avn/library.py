@@ -29,6 +29,7 @@ from avn.navigation.observations import SceneObservations
 from avn.navigation.protocols import Protocol
 from avn.navigation.simulator import Simulator
 from avn.pipeline.apartments import Apartments, PerApartment
+from avn.pipeline.building import build
 from avn.pipeline.dynamics import build_dynamics, changing
 from avn.pipeline.export import settings_of
 from avn.pipeline.models import model_of, train_model
@@ -36,7 +37,6 @@ from avn.pipeline.observations import Observed
 from avn.pipeline.run import Evaluation, episodes_of
 from avn.pipeline.scenes import DirectSound, Geometry
 from avn.pipeline.sounds import dry_sounds
-from avn.pipeline.stage import build
 from avn.pipeline.views import RenderedViews
 from avn.reporting.finished_run import read_run
 

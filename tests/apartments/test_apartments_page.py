@@ -17,9 +17,9 @@ from avn.apartments.floor_plan import FURNITURE_KINDS, MATERIALS, ROOM_KINDS
 from avn.apartments.furniture import Model
 from avn.apartments.splits import PARTS
 from avn.pipeline.apartments import Apartments
+from avn.pipeline.building import build, missing
 from avn.pipeline.scenes import DirectSound, Geometry
 from avn.pipeline.sound_network import SoundNetwork
-from avn.pipeline.stage import build, missing
 from avn.pipeline.views import RenderedViews
 from avn.views import curtain_model
 from avn.views.furniture_models import catalogue

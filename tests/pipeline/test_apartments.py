@@ -16,10 +16,10 @@ from avn.pipeline.apartments import (
     apartments_of_all_subsets,
     plan_hash,
 )
+from avn.pipeline.building import build, missing
 from avn.pipeline.export import stages_of
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.scenes import DirectSound, Geometry, LateReverberation
-from avn.pipeline.stage import build, missing
 from avn.pipeline.views import RenderedViews
 
 FEW = ("split=mini", "acoustics.rays=300", "acoustics.seconds=0.2", "processes=1")

@@ -6,8 +6,8 @@ from small import composed
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_features import AudioEmbeddings
 from avn.pipeline.audio_inference import Clips
+from avn.pipeline.building import build
 from avn.pipeline.sound_network import SourceEstimates
-from avn.pipeline.stage import build
 
 SMALL = (
     "agent=greedy",

@@ -5,9 +5,10 @@ import platform
 import pytest
 from small import composed
 
+from avn.pipeline.building import missing
 from avn.pipeline.estimates import SPEEDS, expected, record
+from avn.pipeline.run import Evaluation
 from avn.pipeline.sound_network import SoundNetwork
-from avn.pipeline.stage import missing
 
 
 def test_durations_of_this_machine_correct_the_estimates(tmp_path, monkeypatch):
@@ -44,3 +45,17 @@ def test_apartments_that_are_there_cost_nothing(tmp_path):
     trace.paths[0].parent.mkdir(parents=True)
     trace.paths[0].touch()
     assert 0 < trace.seconds() < 0.8 * before
+
+
+def test_runs_of_each_agent_have_their_own_record(tmp_path):
+    def run(agent):
+        return Evaluation(
+            composed(f"agent={agent}", "acoustics=diffraction", f"outputs={tmp_path}")
+        )
+
+    posterior, plain = run("belief"), run("ours_noexp")
+    before, of_belief = plain.expected(), posterior.expected()
+    assert of_belief > 2 * before  # a posterior takes longer
+    record(tmp_path, posterior.timed_as, 100.0, 300.0)
+    assert posterior.expected() == pytest.approx(3 * of_belief)
+    assert plain.expected() == before

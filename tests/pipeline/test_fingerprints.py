@@ -15,12 +15,12 @@ from avn.core.errors import UserError
 from avn.navigation.protocols import GOAL_MEANINGS
 from avn.pipeline.agent import build_agent
 from avn.pipeline.apartments import TEST, TRAINING, Apartments
+from avn.pipeline.building import missing
 from avn.pipeline.occupancy import LocalPatches, OccupancyNetwork
 from avn.pipeline.policy import Policy
 from avn.pipeline.run import Evaluation
 from avn.pipeline.scenes import DirectSound, Geometry, LateReverberation
 from avn.pipeline.sound_network import SoundNetwork, SourceEstimates, has_sound_model
-from avn.pipeline.stage import missing
 from avn.pipeline.stop_classifier import StopNetwork, StopProbabilities
 from avn.pipeline.views import RenderedViews
 from avn.pipeline.visual_features import VisualEmbeddings

@@ -6,10 +6,10 @@ from small import SMALL, composed, fitting
 from avn.core.clip_id import ClipId
 from avn.navigation.episodes import ONE_SOUND
 from avn.pipeline.apartments import TRAINING, Apartments
+from avn.pipeline.building import build
 from avn.pipeline.observations import Observed
 from avn.pipeline.run import Evaluation
 from avn.pipeline.scenes import Geometry
-from avn.pipeline.stage import build
 
 ROW = "agent=greedy"
 

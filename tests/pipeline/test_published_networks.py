@@ -12,10 +12,11 @@ from avn.core.errors import UserError
 from avn.modules.settings import BEST
 from avn.pipeline import published_networks
 from avn.pipeline.benchmark import describe_world, paper_sounds
+from avn.pipeline.building import missing
 from avn.pipeline.run import Evaluation
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sound_network import SoundNetwork
-from avn.pipeline.stage import missing, with_needs
+from avn.pipeline.stage import with_needs
 from avn.pipeline.trained import Trained
 
 ROW = (

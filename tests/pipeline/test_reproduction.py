@@ -4,9 +4,9 @@ import pytest
 from small import A3C, EYES, QUIET, SMALL, composed
 
 from avn.config.spare import compose_fitting
+from avn.pipeline.building import make, missing
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.run import Evaluation
-from avn.pipeline.stage import make, missing
 from avn.pipeline.trained import METRICS
 
 ALL_ROWS = ("greedy", "a3c_va", "a3c_va_m_mapper", "plan_noexp")

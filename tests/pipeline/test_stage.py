@@ -11,7 +11,8 @@ from omegaconf import OmegaConf
 from avn.core.errors import UserError
 from avn.core.files import atomic_write
 from avn.core.hashing import digest
-from avn.pipeline.stage import Stage, build, missing
+from avn.pipeline.building import build, missing
+from avn.pipeline.stage import Stage
 
 CONFIG = {
     "outputs": "",

@@ -6,9 +6,9 @@ from small import composed
 
 from avn.core.errors import UserError
 from avn.pipeline.apartments import Apartments
+from avn.pipeline.building import build, missing
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.sound_network import SoundNetwork
-from avn.pipeline.stage import build, missing
 from avn.pipeline.trained import METRICS
 
 

@@ -16,11 +16,11 @@ from avn.core.sound_mix import SoundMix
 from avn.integrations.world import open_world
 from avn.pipeline import replay
 from avn.pipeline.apartments import TRAINING, Apartments
+from avn.pipeline.building import build
 from avn.pipeline.observations import Observed
 from avn.pipeline.observed import RunObservations
 from avn.pipeline.rendered_audio import Waveforms
 from avn.pipeline.scenes import DirectSound, heard_sound
-from avn.pipeline.stage import build
 
 ROW, WALKING = "agent=greedy", "motion=walking"
 TRUTH = ("agent.oracle_inputs=[source_estimate]", "agent.privileged=true")

@@ -29,6 +29,7 @@ from avn.navigation.start_sampler import build_start_sampler
 from avn.pipeline.agent import build_agent
 from avn.pipeline.apartments import TEST, TRAINING, Apartments
 from avn.pipeline.audio_inference import SELECTION_CLIPS, TRAINING_CLIPS, Clips
+from avn.pipeline.building import build
 from avn.pipeline.observation_table import OBSERVATIONS, OWN
 from avn.pipeline.observations import Observed
 from avn.pipeline.policy import learns
@@ -36,7 +37,7 @@ from avn.pipeline.policy_data import build_algorithm
 from avn.pipeline.run import episodes_of
 from avn.pipeline.scenes import Geometry
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import MACHINE, Stage, build
+from avn.pipeline.stage import MACHINE, Stage
 from avn.pipeline.views import RenderedViews
 from avn.rl.environment import NavigationEnv
 

@@ -17,9 +17,10 @@ from avn.core.settings import leaves
 from avn.dataset.scene import AudibleScene, Scene
 from avn.dataset.views import Views
 from avn.pipeline.apartments import apartments_of_all_subsets
+from avn.pipeline.building import discard_if_forced, make, missing
 from avn.pipeline.scenes import DirectSound
 from avn.pipeline.sounds import dry_sounds
-from avn.pipeline.stage import Stage, discard_if_forced, make, missing, with_needs
+from avn.pipeline.stage import Stage, with_needs
 from avn.pipeline.views import RenderedViews
 from avn.reporting.contact_sheet import save_contact_sheet
 from avn.reporting.floor_plan_figure import save_floor_plan

@@ -10,11 +10,11 @@ from avn.core.errors import UserError
 from avn.core.progress import format_duration, log
 from avn.modules.settings import SAME_WEIGHTS, TrainerConfig
 from avn.pipeline.apartments import TRAINING
+from avn.pipeline.building import build
 from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import Policy
 from avn.pipeline.sound_network import SoundNetwork
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import build
 from avn.pipeline.stop_classifier import StopNetwork
 from avn.pipeline.trained import Trained
 

@@ -16,11 +16,11 @@ from avn.core.clip_id import ClipId
 from avn.navigation.trace import Trace
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import Clips
+from avn.pipeline.building import build
 from avn.pipeline.rendered_audio import RenderedClips, unchanged
 from avn.pipeline.replay import Run
 from avn.pipeline.scenes import DirectSound, heard_sound
 from avn.pipeline.sounds import dry_sounds
-from avn.pipeline.stage import build
 from avn.pipeline.views import RenderedViews
 
 

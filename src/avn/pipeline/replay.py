@@ -22,10 +22,10 @@ from avn.core.errors import UserError
 from avn.core.settings import leaves, plain
 from avn.dataset.scene import Scene
 from avn.navigation.trace import Trace
+from avn.pipeline.building import build
 from avn.pipeline.recordings import has_recordings, with_recordings
 from avn.pipeline.run import Evaluation, rollout_scenes
 from avn.pipeline.sounds import sound_files, sounds_content
-from avn.pipeline.stage import build
 from avn.reporting.finished_run import read_run
 
 _OTHER = (

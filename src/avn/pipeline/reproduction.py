@@ -16,10 +16,10 @@ from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest
 from avn.core.progress import format_duration, log
 from avn.pipeline.benchmark import caption_of, paper_sounds_by_agent
+from avn.pipeline.building import announce, discard_if_forced, make, missing, timings
 from avn.pipeline.dashboard import Dashboard
 from avn.pipeline.run import Evaluation, agent_label
 from avn.pipeline.sounds import sound_files
-from avn.pipeline.stage import announce, discard_if_forced, make, missing, timings
 from avn.reporting import comparison_table, published, results, table
 from avn.reporting.comparison import INDEPENDENT, compare
 from avn.reporting.finished_run import RESULTS, read_episodes, read_run

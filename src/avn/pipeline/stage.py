@@ -9,29 +9,22 @@ that it does not read follow too.
 from __future__ import annotations
 
 import shutil
-import time
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
 from omegaconf import DictConfig
 
-from avn.core.errors import UserError
-from avn.core.files import locked, writing
 from avn.core.hashing import digest
 from avn.core.numerics import NATIVE
-from avn.core.progress import format_duration, log, working
 from avn.core.settings import leaves, values
 from avn.core.sources import outside_sources
-from avn.pipeline.estimates import expected, record
+from avn.pipeline.estimates import expected
 
 # Settings that every stage reads and that change no product.
 MACHINE = ("outputs", "processes", "auto", "force")
-# Seconds that this process took for each stage that it made, by title.
-timings: dict[str, float] = {}
 
 
 class Stage(ABC):
@@ -95,6 +88,11 @@ class Stage(ABC):
         """Estimate the duration of what is missing, on two cores, in seconds, without its needs."""
         return 0.0
 
+    @property
+    def timed_as(self) -> str:
+        """Stages whose durations correct the estimate of this one have the same name here."""
+        return self.kind
+
     def begun(self) -> bool:
         """Return whether an interrupted attempt has made a part of it."""
         return False
@@ -153,7 +151,7 @@ class Stage(ABC):
 
     def expected(self) -> float:
         """Return its `seconds`, corrected by the durations of its kind on this machine."""
-        return expected(self.cfg.outputs, self.kind, self.seconds())
+        return expected(self.cfg.outputs, self.timed_as, self.seconds())
 
     def locks(self) -> Sequence[Path]:
         """Return the paths that only one process may write at a time, in a fixed order."""
@@ -185,128 +183,3 @@ def with_needs(stages: Iterable[Stage]) -> list[Stage]:
             visited[stage.fingerprint] = stage
             left.extend(stage.needed)
     return list(visited.values())
-
-
-def missing(stages: Iterable[Stage]) -> list[Stage]:
-    """Return the stages to make for some stages, themselves included, each once and in order.
-
-    Nothing is written. The dependencies of a stage that is done are not examined.
-
-    Raises
-    ------
-    UserError
-        Where settings of one of them cannot work.
-    """
-    wanted = list(stages)
-    ordered = _ordered(wanted, {})
-    writers = {product.fingerprint: stage for stage in ordered for product in stage.by_products()}
-    # the stage that writes a by-product replaces it, so that it is not made twice
-    return _ordered(wanted, writers) if writers else ordered
-
-
-def _ordered(stages: Iterable[Stage], instead: Mapping[str, Stage]) -> list[Stage]:
-    ordered: dict[str, Stage] = {}
-
-    def collect(stage: Stage) -> None:
-        stage = instead.get(stage.fingerprint, stage)
-        if stage.fingerprint in ordered or stage.done():
-            return
-        stage.check()
-        for need in stage.needed:
-            collect(need)
-        ordered[stage.fingerprint] = stage
-
-    for stage in stages:
-        collect(stage)
-    return list(ordered.values())
-
-
-def build(stage: Stage, explicit: bool = False) -> None:
-    """Make a stage and its dependencies where they are missing.
-
-    Parameters
-    ----------
-    stage : Stage
-        Stage to make.
-    explicit : bool
-        Whether the user asked for this product: then `auto=false` does not refuse to make it, and
-        `force=true` makes it anew.
-
-    Raises
-    ------
-    UserError
-        Where a product is missing and `auto` is false, or settings cannot work.
-    """
-    if explicit:
-        discard_if_forced([stage])
-    steps, asked_for = missing([stage]), {stage.fingerprint} if explicit else set()
-    announce(steps, asked_for)
-    for step in steps:
-        make(step, explicit=step.fingerprint in asked_for)
-
-
-def announce(steps: Sequence[Stage], asked_for: Collection[str]) -> None:
-    """Print the stages to make and their expected durations, if there are several.
-
-    Parameters
-    ----------
-    steps : sequence of Stage
-        Result of `missing`.
-    asked_for : collection of str
-        Fingerprints of the stages that may be made where `auto` is false.
-
-    Raises
-    ------
-    UserError
-        Where another stage is missing and `auto` is false.
-    """
-    for step in steps:
-        if not (step.cfg.auto or step.fingerprint in asked_for):
-            raise missing_error(step)
-    if len(steps) > 1:
-        for step in steps:
-            log(f"to make: {step.title} (about {format_duration(step.expected())})")
-        total = sum(step.expected() for step in steps)
-        log(f"all in all about {format_duration(total)}")
-
-
-def discard_if_forced(stages: Iterable[Stage]) -> None:
-    """Delete finished products whose config has `force=true`."""
-    for stage in stages:
-        if stage.cfg.force and stage.done():
-            stage.check()  # a command that cannot work deletes nothing
-            with ExitStack() as held:
-                for path in stage.locks():
-                    held.enter_context(locked(path, stage.title))
-                stage.discard()
-
-
-def make(stage: Stage, explicit: bool = False) -> None:
-    """Make a stage whose needs exist, unless it is done; wait where another process makes it."""
-    if stage.done():
-        return
-    if not (stage.cfg.auto or explicit):
-        raise missing_error(stage)
-    with ExitStack() as held:
-        for path in stage.locks():
-            held.enter_context(locked(path, stage.title))
-        if stage.done():
-            return
-        planned, whole = stage.seconds(), not stage.begun()
-        about = f" (about {format_duration(stage.expected())})" if planned else ""
-        log(f"{stage.title} is missing: making it{about}")
-        started = time.perf_counter()
-        with working(stage.title), writing(stage.folder):
-            stage.make()
-        took = time.perf_counter() - started
-        timings[stage.title] = timings.get(stage.title, 0.0) + took
-        if whole:
-            record(stage.cfg.outputs, stage.kind, planned, took)
-        log(f"{stage.title} made in {format_duration(took)}: {stage.folder}")
-
-
-def missing_error(stage: Stage) -> UserError:
-    """Return the error for a missing product that must not be made."""
-    return UserError(
-        f"{stage.folder}: {stage.title} is missing and auto=false; leave auto=true to make it"
-    )
