@@ -2,15 +2,15 @@
 
     python scripts/publish_networks.py OUTPUTS
 
-Each run of `RUNS` names the networks that its agent uses. Networks that are not trained are listed
-and left out. Weights with two or more dimensions are stored in 16 bits.
+Each run of `RUNS` names the networks that its agent uses. A network that is not trained there stays
+as it was published, or is listed and left out. Weights with two or more dimensions are stored in
+16 bits.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,11 @@ RUNS = [
         for row in PLANNERS
     ),
     *([f"agent={row}", "acoustics=resonance"] for row in ACTOR_CRITICS),
+    # three networks, as the table of conditions has
+    *(
+        ["agent=belief", "acoustics=diffraction", "protocol=stop", f"train_seed={seed}"]
+        for seed in range(3)
+    ),
 ]
 
 
@@ -84,16 +89,23 @@ def main(outputs: str) -> None:
         for stage in with_needs([Evaluation(cfg)]):
             if isinstance(stage, Trained):
                 stages.setdefault(stage.fingerprint, stage)
-    shutil.rmtree(FOLDER, ignore_errors=True)
-    FOLDER.mkdir(parents=True)
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    index = FOLDER / INDEX
+    before = json.loads(index.read_text(encoding="utf-8")) if index.is_file() else []
+    known = {own["fingerprint"]: own for own in before}
     entries = []
-    for stage in stages.values():
+    for fingerprint, stage in stages.items():
         if stage.done():
             entries.append(publish(stage))
+        elif fingerprint in known:
+            entries.append(known[fingerprint])
         else:
             print(f"not trained: {stage.title}")
     text = json.dumps(sorted(entries, key=lambda own: str(own["name"])), indent=1, sort_keys=True)
-    (FOLDER / INDEX).write_text(text + "\n", encoding="utf-8")
+    index.write_text(text + "\n", encoding="utf-8")
+    for path in FOLDER.iterdir():
+        if path != index and path.stem not in {own["name"] for own in entries}:
+            path.unlink()
     size = sum(path.stat().st_size for path in FOLDER.iterdir())
     print(f"{len(entries)} networks, {size / 1e6:.1f} MB")
 

@@ -120,4 +120,4 @@ def test_the_package_has_the_networks_of_the_table():
 
 def test_the_networks_are_small():
     files = list(published_networks.FOLDER.iterdir())
-    assert sum(path.stat().st_size for path in files) < 12e6
+    assert sum(path.stat().st_size for path in files) < 16e6

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+# Characters of names above which sounds are counted.
+_LONGEST = 120
 TRIAL_SPLIT = "mini"
 TRIAL_NOTE = (
     "mini is for trying the software: networks learn next to nothing in it, and its figures mean "
@@ -23,7 +25,7 @@ def trial_note(splits: Iterable[str]) -> str:
 
 
 def sounds_text(sounds: Iterable[str], trained: Iterable[str] | None) -> str:
-    """Describe sounds and whether the networks were trained with them.
+    """Describe sounds and whether the networks were trained with them; many are counted.
 
     Parameters
     ----------
@@ -34,9 +36,14 @@ def sounds_text(sounds: Iterable[str], trained: Iterable[str] | None) -> str:
     """
     names = list(sounds)
     if trained is None:
-        return f"sounds {', '.join(names)}"
+        return _listed(names)
     known = set(trained)
     heard = [name for name in names if name in known]
     unheard = [name for name in names if name not in known]
     parts = [("heard in training", heard), ("not heard in training", unheard)]
-    return "; ".join(f"sounds {', '.join(own)} ({word})" for word, own in parts if own)
+    return "; ".join(f"{_listed(own)} ({word})" for word, own in parts if own)
+
+
+def _listed(names: list[str]) -> str:
+    text = ", ".join(names)
+    return f"sounds {text}" if len(text) <= _LONGEST else f"{len(names)} sounds"
