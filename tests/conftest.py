@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import sys
 
 import pytest
@@ -10,6 +11,13 @@ import torch
 from hydra.core.global_hydra import GlobalHydra
 
 torch.set_num_threads(1)  # also for what is made once a session
+
+
+@pytest.fixture(autouse=True, scope="session")
+def signals_of_a_terminal():
+    """Signals that `nohup` or a shell's background job ignores end a command, as in a terminal."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture(autouse=True)
