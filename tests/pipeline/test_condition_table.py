@@ -4,6 +4,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from small import composed
+
+from avn.pipeline.condition_table import _caption
+from avn.reporting.world import TRIAL_NOTE
 
 SMALL = ("split=mini", "protocol.num_starts=4", "rows=random_walk,oracle", "train_seeds=0")
 
@@ -28,6 +32,18 @@ def test_rows_and_conditions_are_evaluated_and_written(command, tmp_path):
     text = (folder / "table.md").read_text()
     assert "`noise_white_10`" in text
     assert "one sound an episode" in text
+    assert TRIAL_NOTE in text
+    assert any(TRIAL_NOTE in line for line in out), "the figures of mini mean nothing"
+
+
+def test_the_heading_names_what_the_agents_do_and_whose_networks_they_have():
+    looking = [composed("agent=belief", "acoustics=diffraction", "look=around")]
+    assert "; look around; test apartments of var" in _caption(looking)
+    package = composed("agent=belief", "acoustics=diffraction", "networks=published")
+    assert _caption([package]).endswith("networks published with the package")
+    assert "look" not in _caption([package])
+    learns_nothing = composed("agent=random_walk", "acoustics=diffraction")
+    assert "networks" not in _caption([learns_nothing])
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from avn.reporting.world import sounds_text, trial_note
 
 # World of the paper: the direct sound passes through walls, as in its sound engine.
 PAPER_WORLD = {"split": "var", "protocol": "var", "acoustics": "resonance", **STEADY}
+OF_THE_PACKAGE = "networks published with the package"
 # Settings in which repetitions of a run differ, and those that change no record.
 NOT_COMPARED = (
     *("seed", "train_seed", "film", "film_show", "film_speed", *MACHINE),
@@ -134,9 +135,14 @@ def describe_world(cfg: DictConfig, default: DictConfig) -> str:
     if reads_training and scenes != cfg.split.name:
         split += f" (networks trained in {scenes})"
     parts.append(f"{cfg.subset} apartments of {split}")
-    if cfg.get(NETWORKS) == PUBLISHED and NETWORKS in Evaluation(cfg).read():
-        parts.append("networks published with the package")
+    if has_published_networks(cfg):
+        parts.append(OF_THE_PACKAGE)
     return "; ".join(parts)
+
+
+def has_published_networks(cfg: DictConfig) -> bool:
+    """Return whether the networks of a run are those of the package."""
+    return cfg.get(NETWORKS) == PUBLISHED and NETWORKS in Evaluation(cfg).read()
 
 
 def note_of(cfg: DictConfig) -> str:

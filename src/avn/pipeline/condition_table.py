@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -10,6 +10,7 @@ from omegaconf import DictConfig
 
 from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest
+from avn.pipeline.benchmark import OF_THE_PACKAGE, has_published_networks, note_of
 from avn.pipeline.reproduction import make_runs, runs_of, with_networks
 from avn.pipeline.run import agent_label
 from avn.reporting import condition_table, results, table
@@ -55,26 +56,32 @@ def tabulate(cfg: DictConfig, composed: Mapping[tuple[str, str], DictConfig]) ->
     found = condition_table.condition_cells(episodes)
     rows = list(dict.fromkeys(agent_label(config) for config in configs))
     order = list(dict.fromkeys(conditions))
-    table.print_table(condition_table.terminal(found, order, rows), _caption(configs[0]))
+    caption = _caption(configs)
+    table.print_table(condition_table.terminal(found, order, rows), caption)
     target = stage_folder(cfg.outputs, "reproduce", "conditions", digest([f.name for f in folders]))
     results.write_csv(found, target / CELLS)
     with atomic_write(target / TABLE) as part:
-        part.write_text(_markdown(found, order, rows, configs[0]), encoding="utf-8")
+        part.write_text(_markdown(found, order, rows, caption), encoding="utf-8")
     return target
 
 
-def _caption(cfg: DictConfig) -> str:
-    """Return the world that all conditions share."""
-    return (
-        f"acoustics {cfg.acoustics.name}; protocol {cfg.protocol.name}; "
-        f"{cfg.subset} apartments of {cfg.split.name}; one sound an episode"
-    )
+def _caption(configs: Sequence[DictConfig]) -> str:
+    """Return the world that all conditions share, and with `mini` its warning."""
+    cfg = configs[0]
+    parts = [f"acoustics {cfg.acoustics.name}", f"protocol {cfg.protocol.name}"]
+    if cfg.look != results.USUAL_LOOK:
+        parts.append(f"look {cfg.look}")
+    parts += [f"{cfg.subset} apartments of {cfg.split.name}", "one sound an episode"]
+    if any(map(has_published_networks, configs)):
+        parts.append(OF_THE_PACKAGE)
+    return "\n".join(filter(None, ("; ".join(parts), note_of(cfg))))
 
 
-def _markdown(cells: pd.DataFrame, order: list[str], rows: list[str], cfg: DictConfig) -> str:
+def _markdown(cells: pd.DataFrame, order: list[str], rows: list[str], caption: str) -> str:
     networks = int(cells["networks"].max())
+    world, *note = caption.splitlines()
     head = (
-        f"Success rate / SPL in % ({_caption(cfg)}); means of {networks} networks, "
+        f"Success rate / SPL in % ({world}); means of {networks} networks, "
         f"95 % intervals over networks, apartments, sources and episodes below."
     )
-    return f"{head}\n\n{condition_table.markdown(cells, order, rows)}"
+    return "\n\n".join((head, *note, condition_table.markdown(cells, order, rows)))
