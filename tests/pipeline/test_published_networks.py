@@ -82,6 +82,18 @@ def test_what_changes_the_evaluation_alone_keeps_the_network(shipped):
     assert one.fingerprint == other.fingerprint != network().fingerprint
 
 
+def test_publishing_keeps_what_is_not_trained_in_the_folder(shipped, tmp_path, monkeypatch):
+    monkeypatch.setattr(publish_networks, "RUNS", [[*ROW, "logger=none"]])
+    index = published_networks.FOLDER / published_networks.INDEX
+    before = index.read_text()
+    weights = network("networks=published").published.path.read_bytes()
+    (published_networks.FOLDER / "old.safetensors").touch()
+    publish_networks.main(str(tmp_path / "empty"))
+    assert json.loads(index.read_text()) == json.loads(before)
+    assert network("networks=published").published.path.read_bytes() == weights
+    assert not (published_networks.FOLDER / "old.safetensors").exists()
+
+
 def test_a_changed_file_is_refused(shipped):
     path = network("networks=published").published.path
     path.write_bytes(path.read_bytes()[:-1] + b"x")
