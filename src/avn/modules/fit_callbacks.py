@@ -6,8 +6,10 @@ from contextlib import ExitStack
 from typing import Any
 
 import lightning as L
+import torch
 from lightning.pytorch.callbacks import Callback
 
+from avn.core.errors import UserError
 from avn.core.progress import progress_bar
 from avn.modules.network import Network
 
@@ -36,6 +38,20 @@ class History(Callback):
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
         """Restore what `state_dict` returned."""
         self.epochs = state_dict["epochs"]
+
+
+class FiniteWeights(Callback):
+    """Error where a training has diverged, before its weights are measured and kept."""
+
+    def on_validation_start(self, trainer: L.Trainer, pl_module: L.LightningModule) -> None:
+        """See `Callback.on_validation_start`."""
+        assert isinstance(pl_module, Network)
+        if not all(torch.isfinite(own).all() for own in pl_module.parameters()):
+            raise UserError(
+                f"{pl_module.what}: its weights are not finite after epoch "
+                f"{trainer.current_epoch + 1}; give a lower {pl_module.node}.optimizer.lr, "
+                "trainer.gradient_clip_val=1 or trainer.precision=32"
+            )
 
 
 class FixedEpoch(Callback):

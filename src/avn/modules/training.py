@@ -16,7 +16,7 @@ from lightning.pytorch.loggers import Logger
 from avn.core.errors import UserError
 from avn.core.prefetch import threads_for_one_operation
 from avn.modules.checkpoints import check_start, read_checkpoint
-from avn.modules.fit_callbacks import FixedEpoch, FreshStart, History, Progress
+from avn.modules.fit_callbacks import FiniteWeights, FixedEpoch, FreshStart, History, Progress
 from avn.modules.network import Network
 from avn.modules.settings import BEST, LAST, TrainerConfig
 from avn.modules.trainer import build_trainer, quiet
@@ -85,6 +85,7 @@ def fit(
         loggers,
         [
             *_stopping(model, settings),
+            FiniteWeights(),
             history,
             *callbacks,
             Progress(),
