@@ -36,7 +36,7 @@ from avn.pipeline.models import model_of, train_model
 from avn.pipeline.observations import Observed
 from avn.pipeline.run import Evaluation, episodes_of
 from avn.pipeline.scenes import DirectSound, Geometry
-from avn.pipeline.sounds import dry_sounds
+from avn.pipeline.sounds import dry_sounds, microphone_of
 from avn.pipeline.views import RenderedViews
 from avn.reporting.finished_run import read_run
 
@@ -145,8 +145,7 @@ def render_clip(
     for key, (value, count) in limits.items():
         if not 0 <= value < count:
             raise UserError(f"{key}: {value} is none of 0 to {count - 1} of {scene.name}")
-    microphone = build_object("microphone", cfg.microphone)
-    renderer = ClipRenderer(sounds, microphone, seed, "eval")
+    renderer = ClipRenderer(sounds, microphone_of(cfg), seed, "eval")
     index = [source, state, names.index(sound) if sound else 0, realisation]
     clip = ClipId(*(torch.tensor([value]) for value in index))
     spectra = brir_spectra(scene.brirs.gather(clip.source, clip.state), sounds.rate)

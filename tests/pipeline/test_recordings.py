@@ -126,8 +126,37 @@ def test_a_bad_sound_is_refused_before_anything_is_made(
 ):
     monkeypatch.chdir(tmp_path)
     Path("text.wav").write_text("not a sound")
+    assert said in refused_at_once(command, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("eval", "agent=greedy", "microphone.gain=0"), "microphone.gain=0"),
+        (("eval", "agent=greedy", "training.microphone.gain=0"), "training.microphone.gain=0"),
+        (
+            ("eval", "agent=belief", "microphone=white", "microphone.snr=[10]"),
+            "microphone.snr: [10.0]; give",
+        ),
+        (("eval", "agent=belief", "training.microphone.silent=2"), "training.microphone.silent: 2"),
+        (("train", "model=sound_cnn", "training.microphone.gain=0"), "training.microphone.gain=0"),
+        (("train", "model=a3c_va", "training.microphone.gain=0"), "training.microphone.gain=0"),
+        (("generate", "export=wav", "microphone.noise_rms=-1"), "microphone.noise_rms=-1"),
+        (("generate", "export=wav", "clips=[[9,4]]"), "clips: [9, 4] is no [source, state] of"),
+        (("generate", "export=wav", "apartments=nowhere"), "apartments: 'nowhere' is none of"),
+    ],
+)
+def test_bad_clips_are_refused_before_anything_is_made(
+    command, tmp_path, monkeypatch, arguments, said
+):
+    monkeypatch.chdir(tmp_path)
+    assert refused_at_once(command, *arguments).partition(": ")[2].startswith(said)
+
+
+def refused_at_once(command, *arguments):
+    """The line of a command that is refused before anything is made."""
     code, _, err = command(*arguments, "split=mini", "outputs=made")
     assert code == 2, err
-    assert said in err[-1]
     assert err[-1].startswith(f"avn.{arguments[0]}: ")
     assert not list(Path("made").rglob("*.h5")) + list(Path("made").rglob("*.ckpt"))
+    return err[-1]

@@ -16,7 +16,6 @@ from torch import Tensor
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra
 from avn.acoustics.microphone import Microphone
-from avn.core.classes import build_object
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.prefetch import prefetch, threads_for_one_operation
@@ -26,7 +25,7 @@ from avn.dataset.source_locations import locate_sources
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.scenes import DirectSound
-from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
+from avn.pipeline.sounds import dry_sounds, microphone_of, sound_files, sounds_content
 
 if TYPE_CHECKING:
     from avn.modules.audio_network import AudioNetwork
@@ -141,7 +140,7 @@ class AudioInference(ApartmentTensors):
         return 4 * self.pairs_left() * sounds * self.realisations / CLIPS_PER_SECOND
 
     def check(self) -> None:
-        """Refuse a number of realisations that is out of range, and another sampling rate."""
+        """Refuse settings of the clips that cannot work, and another sampling rate."""
         rate, known = self.apartments.node("acoustics").rate, self.network.rate
         if rate != known:
             raise UserError(
@@ -150,13 +149,14 @@ class AudioInference(ApartmentTensors):
             )
         check_realisations(self.cfg, self.clips)
         dry_sounds(self.cfg, self.apartments.world)  # refuses recordings that cannot be read
+        microphone_of(self.cfg, self.apartments.world)
 
     def opened(self) -> Callable[[int], Tensor]:
         """Load the network and the scenes; return the function from index to outputs."""
         network, sound = self.needs()
         model, scenes = network.load(), sound.load()
         sounds = dry_sounds(self.cfg, self.apartments.world)
-        microphone = build_object("microphone", self.apartments.node("microphone"))
+        microphone = microphone_of(self.cfg, self.apartments.world)
 
         def infer_in(index: int) -> Tensor:
             return infer(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,17 +10,17 @@ import torch
 from omegaconf import DictConfig
 
 from avn.acoustics.clips import ClipRenderer, brir_spectra, export_wav
-from avn.core.classes import build_object
+from avn.apartments.floor_plan import FloorPlan
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 from avn.core.progress import log
 from avn.core.settings import leaves
 from avn.dataset.scene import AudibleScene, Scene
 from avn.dataset.views import Views
-from avn.pipeline.apartments import apartments_of_all_subsets
+from avn.pipeline.apartments import apartments_of_all_subsets, cells_of
 from avn.pipeline.building import discard_if_forced, make, missing
 from avn.pipeline.scenes import DirectSound
-from avn.pipeline.sounds import dry_sounds
+from avn.pipeline.sounds import dry_sounds, microphone_of
 from avn.pipeline.stage import Stage, with_needs
 from avn.pipeline.views import RenderedViews
 from avn.reporting.contact_sheet import save_contact_sheet
@@ -46,12 +47,7 @@ def generate(cfg: DictConfig) -> Path:
     UserError
         Where an option cannot work.
     """
-    if cfg.export is not None and cfg.export not in EXPORTS:
-        raise UserError(f"export: '{cfg.export}' is none of {', '.join(EXPORTS)}")
-    if cfg.export is None and (cfg.clips or cfg.apartments):
-        raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
-    if cfg.export == "wav":
-        dry_sounds(cfg)  # a bad file is refused before anything is made
+    _check(cfg)
     stages = stages_of(cfg)
     discard_if_forced(with_needs(stages))
     for stage in missing(stages):
@@ -64,8 +60,28 @@ def generate(cfg: DictConfig) -> Path:
             _report(cfg, scene)
             scenes.append(scene)
     if cfg.export == "wav":
-        _export(cfg, _selected(cfg, scenes))
+        chosen = cfg.apartments
+        _export(cfg, [scene for scene in scenes if not chosen or scene.name in chosen])
     return Path(cfg.outputs) / "generate"
+
+
+def _check(cfg: DictConfig) -> None:
+    """Refuse an export that cannot work, before anything is made."""
+    if cfg.export is not None and cfg.export not in EXPORTS:
+        raise UserError(f"export: '{cfg.export}' is none of {', '.join(EXPORTS)}")
+    if cfg.export is None and (cfg.clips or cfg.apartments):
+        raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
+    if cfg.export is None:
+        return
+    dry_sounds(cfg)
+    microphone_of(cfg)
+    subsets = apartments_of_all_subsets(cfg)
+    plans = {plan.name: plan for apartments in subsets for plan in apartments.plans}
+    for name in cfg.apartments:
+        if name not in plans:
+            raise UserError(f"apartments: '{name}' is none of {', '.join(plans)}")
+    for name in cfg.apartments or plans:
+        _check_pairs(plans[name], cfg.clips)
 
 
 def stages_of(cfg: DictConfig) -> list[Stage]:
@@ -98,22 +114,11 @@ def _report(cfg: DictConfig, scene: AudibleScene) -> None:
     )
 
 
-def _selected(cfg: DictConfig, scenes: list[AudibleScene]) -> list[AudibleScene]:
-    names = [scene.name for scene in scenes]
-    for name in cfg.apartments:
-        if name not in names:
-            raise UserError(f"apartments: '{name}' is none of {', '.join(names)}")
-    return [scene for scene in scenes if not cfg.apartments or scene.name in cfg.apartments]
-
-
 def _export(cfg: DictConfig, scenes: list[AudibleScene]) -> None:
     sounds = dry_sounds(cfg)
-    render = ClipRenderer(
-        sounds, build_object("microphone", cfg.microphone), seed=0, purpose="eval"
-    )
+    render = ClipRenderer(sounds, microphone_of(cfg), seed=0, purpose="eval")
     for scene in scenes:
         pairs = [tuple(pair) for pair in cfg.clips] or _near_and_far(scene)
-        _check_pairs(scene, pairs)
         source, state = (torch.tensor(column) for column in zip(*pairs, strict=True))
         spectra = brir_spectra(scene.brirs.gather(source, state), sounds.rate)
         for index, name in enumerate(sounds.names):
@@ -132,11 +137,11 @@ def _near_and_far(scene: Scene) -> list[tuple[int, int]]:
     return [(0, 4 * int(order[int(share * (len(order) - 1))])) for share in (0.25, 0.5, 1.0)]
 
 
-def _check_pairs(scene: Scene, pairs: list[tuple[int, int]]) -> None:
-    sources, states = len(scene.sources), 4 * scene.grid.cells
+def _check_pairs(plan: FloorPlan, pairs: Sequence[Sequence[int]]) -> None:
+    sources, states = len(plan.sources), 4 * cells_of(plan)
     for pair in pairs:
         if len(pair) != 2 or not (0 <= pair[0] < sources and 0 <= pair[1] < states):
             raise UserError(
-                f"clips: {list(pair)} is no [source, state] of {scene.name}, which has sources 0 "
+                f"clips: {list(pair)} is no [source, state] of {plan.name}, which has sources 0 "
                 f"to {sources - 1} and states 0 to {states - 1}"
             )

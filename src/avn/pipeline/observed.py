@@ -11,7 +11,6 @@ from omegaconf import DictConfig
 from torch import Tensor
 
 from avn.acoustics.clips import ClipRenderer, fade_samples
-from avn.core.classes import build_object
 from avn.core.clip_id import ClipId
 from avn.navigation.trace import Trace
 from avn.pipeline.apartments import Apartments
@@ -20,7 +19,7 @@ from avn.pipeline.building import build
 from avn.pipeline.rendered_audio import RenderedClips, unchanged
 from avn.pipeline.replay import Run
 from avn.pipeline.scenes import DirectSound, heard_sound
-from avn.pipeline.sounds import dry_sounds
+from avn.pipeline.sounds import dry_sounds, microphone_of
 from avn.pipeline.views import RenderedViews
 
 
@@ -49,8 +48,8 @@ class RunObservations:
         self._scenes = {scene.name: scene for scene in sound.load()}
         self._views = dict(zip(self._scenes, (views.rgb for views in rendered.load()), strict=True))
         # the clips of `SourceEstimates`: same microphone, seed and purpose
-        clips, microphone = Clips(), build_object("microphone", cfg.microphone)
-        renderer = ClipRenderer(dry_sounds(cfg), microphone, clips.seed_of(cfg), clips.purpose)
+        clips, sounds = Clips(), dry_sounds(cfg)
+        renderer = ClipRenderer(sounds, microphone_of(cfg), clips.seed_of(cfg), clips.purpose)
         shape = 2, renderer.sounds.rate
         self._clips = {
             name: RenderedClips(scene, renderer, cfg.realisations, unchanged, shape)

@@ -15,7 +15,7 @@ from omegaconf import DictConfig, OmegaConf
 from torch import Tensor
 
 from avn.acoustics.clips import ClipRenderer, brir_spectra
-from avn.core.classes import build_object, build_part
+from avn.core.classes import build_part
 from avn.core.clip_id import ClipId
 from avn.core.settings import plain
 from avn.core.sound_mix import SoundMix
@@ -24,7 +24,7 @@ from avn.modules.spectrogram import Spectrogram
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import Clips, check_realisations
 from avn.pipeline.scenes import heard_sound
-from avn.pipeline.sounds import dry_sounds, sounds_content
+from avn.pipeline.sounds import dry_sounds, microphone_of, sounds_content
 from avn.pipeline.stage import Stage
 
 # Clips rendered at once, for the caches of a CPU.
@@ -90,8 +90,9 @@ class Waveforms(Stage):
         return self.needed[0].folder
 
     def check(self) -> None:
-        """Refuse a number of realisations that is out of range."""
+        """Refuse settings of the clips that cannot work."""
         check_realisations(self.cfg, self.clips)
+        microphone_of(self.cfg, self.apartments.world)
 
     def done(self) -> bool:
         """Return whether the acoustics exist."""
@@ -111,7 +112,7 @@ class Waveforms(Stage):
     def load(self) -> list[RenderedClips]:
         """Return the renderer of each apartment."""
         world = self.apartments.world
-        microphone = build_object(world.microphone, OmegaConf.select(self.cfg, world.microphone))
+        microphone = microphone_of(self.cfg, world)
         sounds = dry_sounds(self.cfg, world)
         seed = self.clips.seed_of(self.cfg)
         renderer = ClipRenderer(sounds, microphone, seed, self.clips.purpose)

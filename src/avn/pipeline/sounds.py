@@ -1,4 +1,4 @@
-"""The recordings of the test world and of the training world."""
+"""The recordings and the microphone of the test world and of the training world."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from omegaconf import DictConfig, OmegaConf
 
 from avn.acoustics.clips import DrySounds
 from avn.acoustics.dry_sounds import content_hash, load_sounds
+from avn.acoustics.microphone import Microphone
 from avn.acoustics.sound_names import name_sounds
 from avn.acoustics.sound_table import packaged_sounds
+from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.files import check_name
 from avn.core.settings import plain
@@ -38,6 +40,18 @@ def dry_sounds(cfg: DictConfig, world: WorldKeys = TEST) -> DrySounds:
     """Load the recordings of a world; raise `UserError` where one cannot be read."""
     rate = int(OmegaConf.select(cfg, world.acoustics).rate)
     return DrySounds(load_sounds(sound_files(cfg, world), rate), rate=rate)
+
+
+def microphone_of(cfg: DictConfig, world: WorldKeys = TEST) -> Microphone:
+    """Return the microphone of a world; raise `UserError` for an invalid setting."""
+    key = world.microphone
+    try:
+        found: Microphone = build_object(key, OmegaConf.select(cfg, key))
+    except UserError as error:
+        # a class names its settings as those of `microphone`, whichever world it is in
+        rest = str(error).removeprefix("microphone.")
+        raise UserError(str(error) if rest == str(error) else f"{key}.{rest}") from None
+    return found
 
 
 def sounds_content(cfg: DictConfig, world: WorldKeys = TEST) -> list[Any]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from avn.core.classes import build_object
 from avn.core.errors import UserError
 from avn.core.settings import typed
 from avn.pipeline.apartments import TRAINING
 from avn.pipeline.fitted import Fitted
 from avn.pipeline.scenes import DirectSound
-from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
+from avn.pipeline.sounds import dry_sounds, microphone_of, sound_files, sounds_content
 
 # Clips that two cores train on in a second.
 CLIPS_PER_SECOND = 1000
@@ -34,6 +33,7 @@ class TrainedOnClips(Fitted):
             raise UserError(self.without)
         super().check()
         dry_sounds(self.cfg, TRAINING)  # a bad file is refused before anything is made
+        microphone_of(self.cfg, TRAINING)
 
     @property
     def rate(self) -> int:
@@ -71,6 +71,6 @@ class TrainedOnClips(Fitted):
             "train": train,
             "validation": validation,
             "sounds": dry_sounds(self.cfg, TRAINING),
-            "microphone": build_object("microphone", self.train.node("microphone")),
+            "microphone": microphone_of(self.cfg, TRAINING),
             "recipe": typed(self.cfg[self.node]),
         }
