@@ -91,10 +91,41 @@ def load_sounds(mapping: Mapping[str, str], rate: int = RATE) -> dict[str, NDArr
         If `read_sound` raises it, or the mapping is empty.
     """
     _require_sounds(mapping)
+    _tell_replaced(mapping)
+    return {name: read_sound(path, rate) for name, path in mapping.items()}
+
+
+def check_sounds(mapping: Mapping[str, str], rate: int = RATE) -> None:
+    """Raise `UserError` where `load_sounds` would.
+
+    Parameters
+    ----------
+    mapping : mapping
+        As for `load_sounds`.
+    rate : int
+        Sampling rate in Hz.
+
+    Raises
+    ------
+    UserError
+        If `read_sound` raises it, or the mapping is empty.
+    """
+    _require_sounds(mapping)
+    _tell_replaced(mapping)
+    for path in mapping.values():
+        # a command checks the same sounds for several stages
+        (_check_packaged if path in packaged_sounds() else read_sound)(path, rate)
+
+
+@cache
+def _check_packaged(name: str, rate: int) -> None:
+    read_sound(name, rate)
+
+
+def _tell_replaced(mapping: Mapping[str, str]) -> None:
     for name, path in mapping.items():
         if name in packaged_sounds() and path != name:
             _tell_once(f"sound '{name}': {_readable(str(path))}, in place of the built-in {name}")
-    return {name: read_sound(path, rate) for name, path in mapping.items()}
 
 
 def content_hash(mapping: Mapping[str, str]) -> dict[str, str]:

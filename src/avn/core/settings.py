@@ -71,18 +71,31 @@ def leaves(cfg: DictConfig, keys: Sequence[str], ignored: Sequence[str] = ()) ->
     return {leaf for key in keys for leaf in _leaves(cfg, key, hidden)}
 
 
-def _leaves(cfg: DictConfig, key: str, ignored: set[str], below: bool = False) -> Iterator[str]:
-    # `below`: the parent node of the key has been visited
+def _leaves(cfg: DictConfig, key: str, ignored: set[str]) -> Iterator[str]:
     if key in ignored:
         return
-    for other, hidden in _referred(cfg, key, ignored, below):
+    for other, hidden in _referred(cfg, key, ignored):
         yield from _leaves(cfg, other, hidden)
     value = OmegaConf.select(cfg, key)
     if isinstance(value, DictConfig) and len(value):
-        for child in map(str, value):
-            yield from _leaves(cfg, below_key(key, child), ignored, below=True)
-    elif below or _holds(cfg, key):
+        yield from _below(cfg, key, value, ignored)
+    elif _holds(cfg, key):
         yield key
+
+
+def _below(cfg: DictConfig, key: str, node: DictConfig, ignored: set[str]) -> Iterator[str]:
+    """Yield the leaves of a node, and of those that they refer to. `key` is the node's own."""
+    for name in node:
+        child = below_key(key, str(name))
+        if child in ignored:
+            continue
+        for other, hidden in _references(node, name, child, ignored):
+            yield from _leaves(cfg, other, hidden)
+        value = None if OmegaConf.is_missing(node, name) else node[name]
+        if isinstance(value, DictConfig) and len(value):
+            yield from _below(cfg, child, value, ignored)
+        else:
+            yield child
 
 
 def below_key(key: str, child: str) -> str:
@@ -90,22 +103,27 @@ def below_key(key: str, child: str) -> str:
     return f"{key}[{child}]" if "." in child else f"{key}.{child}"
 
 
-def _referred(
-    cfg: DictConfig, key: str, ignored: set[str], last: bool
-) -> Iterator[tuple[str, set[str]]]:
+def _referred(cfg: DictConfig, key: str, ignored: set[str]) -> Iterator[tuple[str, set[str]]]:
     """Yield the keys that a key or a node above it refers to, each with the keys ignored there."""
     parts = key.split(".")
-    for count in range(len(parts) if last else 1, len(parts) + 1):
+    for count in range(1, len(parts) + 1):
         node = ".".join(parts[:count])
         holder = OmegaConf.select(cfg, ".".join(parts[: count - 1])) if count > 1 else cfg
         # `in holder` would follow the reference
         if not isinstance(holder, DictConfig) or parts[count - 1] not in holder.keys():  # noqa: SIM118
             return
-        if OmegaConf.is_interpolation(holder, parts[count - 1]):
-            raw = holder._get_node(parts[count - 1])._value()  # type: ignore[union-attr]
-            for other in _REFERENCE.findall(str(raw)):
-                moved = {other + k[len(node) :] for k in ignored if k.startswith(f"{node}.")}
-                yield other + key[len(node) :], moved
+        for other, moved in _references(holder, parts[count - 1], node, ignored):
+            yield other + key[len(node) :], moved
+
+
+def _references(
+    holder: DictConfig, name: Any, key: str, ignored: set[str]
+) -> Iterator[tuple[str, set[str]]]:
+    """Yield the keys that one value refers to, each with the keys ignored there."""
+    if OmegaConf.is_interpolation(holder, name):
+        raw = holder._get_node(name)._value()  # type: ignore[union-attr]
+        for other in _REFERENCE.findall(str(raw)):
+            yield other, {other + k[len(key) :] for k in ignored if k.startswith(f"{key}.")}
 
 
 def _holds(cfg: DictConfig, key: str) -> bool:

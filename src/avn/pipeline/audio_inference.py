@@ -25,7 +25,13 @@ from avn.dataset.source_locations import locate_sources
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.per_scene import ApartmentTensors
 from avn.pipeline.scenes import DirectSound
-from avn.pipeline.sounds import dry_sounds, microphone_of, sound_files, sounds_content
+from avn.pipeline.sounds import (
+    check_heard,
+    dry_sounds,
+    microphone_of,
+    sound_files,
+    sounds_content,
+)
 
 if TYPE_CHECKING:
     from avn.modules.audio_network import AudioNetwork
@@ -148,8 +154,7 @@ class AudioInference(ApartmentTensors):
                 f"trained at {known} Hz; give training.acoustics.rate the same"
             )
         check_realisations(self.cfg, self.clips)
-        dry_sounds(self.cfg, self.apartments.world)  # refuses recordings that cannot be read
-        microphone_of(self.cfg, self.apartments.world)
+        check_heard(self.cfg, self.apartments.world)
 
     def opened(self) -> Callable[[int], Tensor]:
         """Load the network and the scenes; return the function from index to outputs."""

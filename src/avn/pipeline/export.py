@@ -20,7 +20,7 @@ from avn.dataset.views import Views
 from avn.pipeline.apartments import apartments_of_all_subsets, cells_of
 from avn.pipeline.building import discard_if_forced, make, missing
 from avn.pipeline.scenes import DirectSound
-from avn.pipeline.sounds import dry_sounds, microphone_of
+from avn.pipeline.sounds import check_heard, dry_sounds, microphone_of
 from avn.pipeline.stage import Stage, with_needs
 from avn.pipeline.views import RenderedViews
 from avn.reporting.contact_sheet import save_contact_sheet
@@ -73,8 +73,7 @@ def _check(cfg: DictConfig) -> None:
         raise UserError("clips, apartments: choose what export=wav writes; add export=wav")
     if cfg.export is None:
         return
-    dry_sounds(cfg)
-    microphone_of(cfg)
+    check_heard(cfg)
     subsets = apartments_of_all_subsets(cfg)
     plans = {plan.name: plan for apartments in subsets for plan in apartments.plans}
     for name in cfg.apartments:

@@ -24,7 +24,7 @@ from avn.modules.spectrogram import Spectrogram
 from avn.pipeline.apartments import Apartments
 from avn.pipeline.audio_inference import Clips, check_realisations
 from avn.pipeline.scenes import heard_sound
-from avn.pipeline.sounds import dry_sounds, microphone_of, sounds_content
+from avn.pipeline.sounds import check_heard, dry_sounds, microphone_of, sounds_content
 from avn.pipeline.stage import Stage
 
 # Clips rendered at once, for the caches of a CPU.
@@ -92,7 +92,7 @@ class Waveforms(Stage):
     def check(self) -> None:
         """Refuse settings of the clips that cannot work."""
         check_realisations(self.cfg, self.clips)
-        microphone_of(self.cfg, self.apartments.world)
+        check_heard(self.cfg, self.apartments.world)
 
     def done(self) -> bool:
         """Return whether the acoustics exist."""

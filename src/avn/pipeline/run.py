@@ -45,7 +45,7 @@ from avn.pipeline.occupancy import OccupancyNetwork
 from avn.pipeline.policy import learns
 from avn.pipeline.recordings import keep_recordings
 from avn.pipeline.scenes import Geometry
-from avn.pipeline.sounds import dry_sounds, sound_files, sounds_content
+from avn.pipeline.sounds import check_heard, sound_files, sounds_content
 from avn.pipeline.stage import Stage
 from avn.reporting import results
 from avn.reporting.finished_run import EPISODE_RECORDS, RESULTS
@@ -185,7 +185,7 @@ class Evaluation(Stage):
             )
         check_agent(cfg, agent)
         check_dynamics(cfg, self.apartments.plans)
-        dry_sounds(cfg)  # a bad file is refused before anything is made
+        check_heard(cfg)  # a bad file is refused before anything is made
 
     def done(self) -> bool:
         """Return whether the results have been written."""

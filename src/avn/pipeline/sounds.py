@@ -7,7 +7,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from avn.acoustics.clips import DrySounds
-from avn.acoustics.dry_sounds import content_hash, load_sounds
+from avn.acoustics.dry_sounds import check_sounds, content_hash, load_sounds
 from avn.acoustics.microphone import Microphone
 from avn.acoustics.sound_names import name_sounds
 from avn.acoustics.sound_table import packaged_sounds
@@ -40,6 +40,12 @@ def dry_sounds(cfg: DictConfig, world: WorldKeys = TEST) -> DrySounds:
     """Load the recordings of a world; raise `UserError` where one cannot be read."""
     rate = int(OmegaConf.select(cfg, world.acoustics).rate)
     return DrySounds(load_sounds(sound_files(cfg, world), rate), rate=rate)
+
+
+def check_heard(cfg: DictConfig, world: WorldKeys = TEST) -> None:
+    """Raise `UserError` where a recording of a world cannot be read, or its microphone is wrong."""
+    check_sounds(sound_files(cfg, world), int(OmegaConf.select(cfg, world.acoustics).rate))
+    microphone_of(cfg, world)
 
 
 def microphone_of(cfg: DictConfig, world: WorldKeys = TEST) -> Microphone:

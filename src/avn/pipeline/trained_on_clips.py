@@ -10,7 +10,13 @@ from avn.core.settings import typed
 from avn.pipeline.apartments import TRAINING
 from avn.pipeline.fitted import Fitted
 from avn.pipeline.scenes import DirectSound
-from avn.pipeline.sounds import dry_sounds, microphone_of, sound_files, sounds_content
+from avn.pipeline.sounds import (
+    check_heard,
+    dry_sounds,
+    microphone_of,
+    sound_files,
+    sounds_content,
+)
 
 # Clips that two cores train on in a second.
 CLIPS_PER_SECOND = 1000
@@ -32,8 +38,7 @@ class TrainedOnClips(Fitted):
         if self.cfg[self.node].name == "none":
             raise UserError(self.without)
         super().check()
-        dry_sounds(self.cfg, TRAINING)  # a bad file is refused before anything is made
-        microphone_of(self.cfg, TRAINING)
+        check_heard(self.cfg, TRAINING)  # a bad file is refused before anything is made
 
     @property
     def rate(self) -> int:
