@@ -1,10 +1,7 @@
-import os
-import signal
-import time
-
 import pandas as pd
 import pytest
 import torch
+from small_actor_critics import measure, training
 from small_training import loggers
 from small_worlds import make_spec, make_trajectories, make_worker, random_tables
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
@@ -12,24 +9,11 @@ from torch.nn import functional as F
 
 from avn.core.errors import UserError
 from avn.navigation.reward import RewardConfig
-from avn.rl import worker_pool
 from avn.rl.checkpoints import BEST, LAST, load_network, read_checkpoint
 from avn.rl.curve import best_of
 from avn.rl.networks import ActorCritic, sample
 from avn.rl.shared import SharedState
 from avn.rl.training import Training
-
-
-def measure(network):
-    """A figure that no two networks share."""
-    return {"validation/spl": float(network.actor.weight.detach().sum())}
-
-
-def training(spec, folder, fingerprint="a" * 64) -> Training:
-    torch.manual_seed(1)
-    network = ActorCritic(spec.network_spec)
-    network.load_state_dict(spec.buffers, strict=False)
-    return Training(spec, network, folder, measure, fingerprint)
 
 
 def test_shared_rmsprop_is_that_of_torch():
@@ -135,95 +119,6 @@ def test_a_training_that_was_killed_goes_on_as_if_it_had_not_been(flat, rules, t
         assert {k: v for k, v in one.items() if k not in times} == {
             k: v for k, v in other.items() if k not in times
         }
-
-
-def test_two_workers_in_turn_give_the_same_bytes_every_time_and_a_round_at_a_time(
-    flat, rules, tmp_path
-):
-    options = {"workers": 2, "total_steps": 960, "validate_every": 480}
-    spec = make_spec(random_tables([flat], rules), rules, **options)
-    once, pieces = training(spec, tmp_path / "once"), training(spec, tmp_path / "pieces")
-    once.run()
-    pieces.run(rounds=1)
-    again = training(spec, tmp_path / "pieces")
-    again.run()
-    assert torch.equal(once.shared.weights, again.shared.weights)
-    alone = training(make_spec(spec.tables, rules, total_steps=960), tmp_path / "alone")
-    alone.run()
-    assert not torch.equal(once.shared.weights, alone.shared.weights)
-
-
-def test_workers_that_run_freely_apply_all_their_gradients(flat, rules, tmp_path):
-    options = {"workers": 2, "update_order": "free", "total_steps": 1200, "validate_every": 600}
-    free = training(make_spec(random_tables([flat], rules), rules, **options), tmp_path / "free")
-    free.run()
-    assert free.steps == 1200
-    assert {"entropy", "loss/value", "gradient_norm", "steps_per_second"} <= free.curve[-1].keys()
-
-
-def test_a_worker_that_dies_ends_the_run_and_leaves_the_last_checkpoint_whole(
-    flat, rules, tmp_path, monkeypatch
-):
-    options = {"workers": 2, "total_steps": 3_000_000, "validate_every": 300}
-    spec = make_spec(random_tables([flat], rules), rules, **options)
-    killed = []
-
-    class Murderous(worker_pool.SpawnedPool):
-        def run_chunk(self, updates, progress):
-            if len(read_checkpoint(tmp_path / LAST, "a" * 64)["curve"]) == 2:
-                killed.append(self._processes[1].pid)
-                os.kill(self._processes[1].pid, signal.SIGKILL)
-                time.sleep(0.1)
-            return super().run_chunk(updates, progress)
-
-    monkeypatch.setattr("avn.rl.training.start_pool", Murderous)
-    with pytest.raises(UserError, match=r"worker 1 died.*the last checkpoint is whole"):
-        training(spec, tmp_path).run()
-    assert killed
-    assert len(read_checkpoint(tmp_path / LAST, "a" * 64)["curve"]) == 2
-    assert training(spec, tmp_path).steps == 300
-
-
-def test_workers_share_files_and_no_shared_memory(flat, rules, tmp_path, monkeypatch):
-    """A container has 64 MB of shared memory, and the tables of a training may have more."""
-
-    def refuse(*_):
-        raise RuntimeError("unable to write to shared memory")
-
-    for name in ("_share_fd_cpu_", "_share_filename_cpu_"):
-        monkeypatch.setattr(torch.UntypedStorage, name, refuse)
-    spec = make_spec(random_tables([flat], rules), rules, workers=2, total_steps=120)
-    run = training(spec, tmp_path)
-    before = run.shared.weights.clone()
-    run.run()
-    assert int(run.shared.updates) == 4  # 120 steps of 6 environments and rollouts of 5
-    assert not torch.equal(run.shared.weights, before)
-    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
-
-
-def test_a_machine_without_semaphores_is_one_line(flat, rules, tmp_path, monkeypatch):
-    def refuse(*_):
-        raise OSError(30, "Read-only file system")
-
-    monkeypatch.setattr(worker_pool, "_locks", refuse)
-    spec = make_spec(random_tables([flat], rules), rules, workers=2, total_steps=120)
-    with pytest.raises(UserError, match=r"give algorithm\.workers=1"):
-        training(spec, tmp_path).run()
-
-
-def test_what_a_worker_refuses_is_said_in_one_line(flat, rules, tmp_path):
-    spec = make_spec(random_tables([flat], rules), rules, workers=2, total_steps=600, maps=1)
-    object.__setattr__(spec, "map_size", 5)  # a map that no agent fits on
-    with pytest.raises(UserError, match=r"mapper\.size|baseline\.map_width"):
-        training(spec, tmp_path).run()
-
-
-def test_more_workers_than_cores_are_warned_of(flat, rules, capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    monkeypatch.setattr(worker_pool, "SpawnedPool", lambda *_: None)
-    spec = make_spec(random_tables([flat], rules), rules, workers=2)
-    worker_pool.start_pool(spec, None, [], tmp_path)
-    assert "2 workers share 1 cores" in capsys.readouterr().out
 
 
 def test_checkpoints_of_another_row_and_damaged_ones_are_refused(flat, rules, tmp_path):
@@ -367,3 +262,14 @@ def test_the_success_of_training_episodes_is_that_of_the_environment(flat, rules
     expected = batch["next", "terminated"][ended].float().mean()  # it ends where it succeeds
     assert 0 < float(expected) < 1
     assert worker.episode_stats.metrics()["success"] == pytest.approx(float(expected))
+
+
+def test_a_training_that_diverges_is_one_line_and_keeps_what_was_before(flat, rules, tmp_path):
+    spec = make_spec(random_tables([flat], rules), rules, total_steps=600, validate_every=300)
+    run = training(spec, tmp_path)
+    run.run(rounds=1)
+    kept = read_checkpoint(tmp_path / LAST, "a" * 64)
+    run.shared.weights[0] = float("nan")
+    with pytest.raises(UserError, match=r"not finite after 600 steps.*algorithm\.lr"):
+        run.run()
+    assert torch.equal(read_checkpoint(tmp_path / LAST, "a" * 64)["weights"], kept["weights"])

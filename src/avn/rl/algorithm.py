@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 
 from tensordict import TensorDict
 from torch import Tensor
@@ -118,7 +119,8 @@ class Algorithm(ABC):
         counts += ("validate_every", "validation_starts")
         self.check(counts, lambda value: value >= 1, "1 or more")
         self.check(("alpha", "gamma"), lambda value: 0 <= value <= 1, "0 to 1")
-        self.check(("lr", "eps", "max_grad_norm"), lambda value: value > 0, "more than 0")
+        self.check(("lr", "eps"), lambda value: 0 < value < inf, "more than 0")
+        self.check(("max_grad_norm",), lambda value: value > 0, "more than 0")
         self._check_names("update_order", UPDATE_ORDERS)
         self._check_names("collector", COLLECTORS)
         self._check_names("schedule", SCHEDULES)

@@ -107,7 +107,7 @@ class Training:
         Raises
         ------
         UserError
-            If a worker dies.
+            If a worker dies, or the training diverges.
         """
         recipe = self.spec.recipe
         updates = max(1, recipe.total_steps // (recipe.batch * recipe.workers))
@@ -180,6 +180,11 @@ class Training:
 
     def _end_round(self, metrics: dict[str, float], loggers: Sequence[Logger]) -> None:
         """Validate, save the best network, log, and write the checkpoint."""
+        if not self.shared.weights.isfinite().all():
+            raise UserError(
+                f"{self.folder.name}: its weights are not finite after {self.steps} steps; the "
+                "checkpoint before is kept; give a lower algorithm.lr or algorithm.max_grad_norm"
+            )
         self._weights.copy_(self.shared.weights)
         found = {"steps": float(self.steps), **metrics, **self.measure(self.network)}
         self.curve.append(found)
