@@ -49,8 +49,8 @@ JOBS = {
 def test_its_jobs_lack_products_alone(command, tmp_path, path, which):
     name, _ = COMMAND.search(path.read_text()).groups()
     chosen = [f"{key}={values[which]}" for key, values in swept(path).items()]
-    if seeds := yaml.safe_load(path.read_text()).get("seeds"):
-        chosen.append(f"seeds={seeds[which]}")
+    if which and (seeds := yaml.safe_load(path.read_text()).get("seeds")):
+        chosen.append(f"seeds={seeds[-1]}")  # the first job has all of them
     given = ("split=mini", "auto=false", f"outputs={tmp_path}/o")
     code, _, err = command(name, f"experiment={path.stem}", *chosen, *given)
     assert code == 2

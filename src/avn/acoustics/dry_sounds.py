@@ -113,11 +113,13 @@ def check_sounds(mapping: Mapping[str, str], rate: int = RATE) -> None:
     _require_sounds(mapping)
     _tell_replaced(mapping)
     for path in mapping.values():
-        # a command checks the same sounds for several stages
-        (_check_packaged if path in packaged_sounds() else read_sound)(path, rate)
+        if path in packaged_sounds():
+            _check_packaged(path, rate)
+        else:
+            read_sound(path, rate)
 
 
-@cache
+@cache  # a command checks the same sounds for several stages
 def _check_packaged(name: str, rate: int) -> None:
     read_sound(name, rate)
 
