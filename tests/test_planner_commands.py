@@ -185,6 +185,7 @@ def test_validation_apartments_can_be_walked_to_choose_on(command, outputs):
         (("agent=belief", "planner.source_filter=bayes"), "planner.source_filter"),
         (("agent=belief", "planner.stop_above=0.4"), "planner.stop_above"),
         (("agent=belief", "planner.model.kept=2"), "planner.model.kept: 2"),
+        (("agent=belief", "planner.model.forget_by=time"), "planner.model.forget_by: time; give"),
         (("agent=direction_follower", "planner.ahead=0.5"), "planner.ahead: 0.5"),
         (("agent=direction_follower", "planner.stop_within=1"), "planner.stop_within"),
         (("agent=frontier", "planner.sector=0"), "planner.sector: 0"),

@@ -148,6 +148,44 @@ def test_forgotten_evidence_has_no_weight():
     assert np.array_equal(one.log_belief, other.log_belief)
 
 
+def test_evidence_is_forgotten_by_what_new_clips_tell():
+    cost = np.ones((1, SIZE, SIZE), np.float32)
+    far, near = (35, 35), (20, 30)
+    unknown = np.full((1, BINS), -math.log(BINS), np.float32)
+    half = np.full((1, BINS), -math.log(BINS / 2), np.float32)
+    half[0, BINS // 2 :] = -np.inf
+    clear, distance = heard(cost, (20, 20, 0), near)
+
+    def weight_of_first(bearing):
+        belief = ArrivalBelief(1, SIZE, BINS, ArrivalModel(kept=0.5, forget_by="information"))
+        belief.hear(np.array([(10, 10, 0)]), *heard(cost, (10, 10, 0), far), ALL)
+        first = int(belief._newest[0])
+        belief.hear(np.array([(20, 20, 0)]), bearing, distance, ALL)
+        return float(belief._weight[0, first])
+
+    assert weight_of_first(unknown) == pytest.approx(1), (
+        "a clip that tells nothing replaces nothing"
+    )
+    assert weight_of_first(half) == pytest.approx(0.5 ** math.log(2))
+    assert weight_of_first(clear) == pytest.approx(0.5 ** math.log(BINS), rel=0.1)
+
+
+def test_with_forgetting_by_information_noise_leaves_what_was_heard_before():
+    cost, source = np.ones((1, SIZE, SIZE), np.float32), (30, 22)
+    noise = np.full((1, BINS), -math.log(BINS), np.float32), np.array([[2.0, 3.0]], np.float32)
+    found = {}
+    for forget_by in ("square", "information"):
+        belief = ArrivalBelief(1, SIZE, BINS, ArrivalModel(kept=0.5, forget_by=forget_by))
+        for x in (8, 10, 12):
+            belief.hear(np.array([(x, 10, 0)]), *heard(cost, (x, 10, 0), source), ALL)
+        for x in (13, 14, 15):
+            belief.hear(np.array([(x, 10, 0)]), *noise, ALL)
+        belief.score(cost, ALL)
+        near = np.array([(0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)])
+        found[forget_by] = belief.near(np.array([source]), near)[0]
+    assert found["information"] > 2 * found["square"]
+
+
 def test_headings_at_one_place_agree_on_the_map():
     cost, source = rooms(), (20, 17)
     once = walk(cost, [(12, 12, 0)], source)
@@ -175,7 +213,8 @@ def test_when_all_was_searched_the_search_begins_again():
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("places", 0), ("kept", 1.5), ("blur", 0.0), ("tail", 0.6)]
+    ("key", "value"),
+    [("places", 0), ("kept", 1.5), ("blur", 0.0), ("tail", 0.6), ("forget_by", "time")],
 )
 def test_settings_out_of_range_are_refused(key, value):
     with pytest.raises(UserError, match=f"planner.model.{key}"):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from avn.core.actions import HEADINGS
 from avn.planning.field_state import STRAIGHT
-from avn.planning.posterior import best_around, likely, parts, score
+from avn.planning.posterior import best_around, information, likely, parts, score
 from avn.planning.searched import Searched
 from avn.planning.settings import ArrivalModel
 from avn.planning.sound_fields import SoundFields
@@ -24,7 +24,7 @@ class ArrivalBelief(Searched):
     Evidence is what was heard at the last K squares at which an agent was: a distribution of the
     direction of arrival for each heading, and the length of the path of the sound. A square is
     scored by the direction and the length of the shortest path to it on the map of now, from each
-    of these places. Evidence is forgotten with each square walked.
+    of these places. Evidence is forgotten as the agent walks; see `ArrivalModel.forget_by`.
 
     Parameters
     ----------
@@ -91,7 +91,9 @@ class ArrivalBelief(Searched):
         here = self._position[rows, self._newest[rows]]
         moved = rows[(here != pose[rows, :2]).any(1)]
         self._newest[moved] = (self._newest[moved] + 1) % self.model.places
-        self._weight[moved] *= self.model.kept
+        by_square = self.model.forget_by == "square"
+        told = np.float32(1) if by_square else information(bearing[moved])[:, None]
+        self._weight[moved] *= np.float32(self.model.kept) ** told
         place = moved, self._newest[moved]
         self._position[place], self._weight[place] = pose[moved, :2], 1.0
         self._fields.forget(*place)

@@ -34,6 +34,13 @@ def likely(log_belief: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.exp(log_belief - np.where(np.isfinite(top), top, np.float32(0)))
 
 
+def information(log_share: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return what distributions over B directions tell, in nats, (R,): log(B) less the entropy."""
+    # the term of a direction that is excluded, at -inf, is 0
+    terms = np.exp(log_share) * np.maximum(log_share, np.finfo(np.float32).min)
+    return np.maximum(np.float32(np.log(log_share.shape[1])) + terms.sum(1), np.float32(0))
+
+
 @numba.njit(cache=True)
 def best_around(belief, offsets):  # type: ignore[no-untyped-def]
     """Return the square with the greatest sum at some offsets, of those above 0: (R,) int64.

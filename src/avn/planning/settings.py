@@ -65,7 +65,12 @@ class ArrivalModel:
     places : int
         Squares walked whose evidence is kept, 1 to 50.
     kept : float
-        Share of the weight of evidence that is kept with each square walked, 0 to 1.
+        Share of the weight of evidence that is kept, 0 to 1, by `forget_by`.
+    forget_by : {"square", "information"}
+        "square" keeps the share `kept` with each square walked. "information" keeps `kept` to the
+        power of what the first clip heard on the new square tells about the direction of arrival,
+        in nats: log(B) less the entropy over B directions. Evidence then lasts in noise, and what
+        is heard clearly replaces it.
     bearing_weight, distance_weight : float
         Factors of the two terms, 0 to 100; below 1 because errors of nearby places are correlated.
     shared_by_headings : float or None
@@ -96,6 +101,7 @@ class ArrivalModel:
 
     places: int = 6
     kept: float = 0.7
+    forget_by: str = "square"
     bearing_weight: float = 1.0
     distance_weight: float = 1.0
     shared_by_headings: float | None = None
@@ -123,3 +129,7 @@ class ArrivalModel:
             value = getattr(self, key)
             if value is not None and not least <= value <= most:
                 raise UserError(f"planner.model.{key}: {value}; give {least} to {most}")
+        if self.forget_by not in ("square", "information"):
+            raise UserError(
+                f"planner.model.forget_by: {self.forget_by}; give square or information"
+            )
