@@ -1,5 +1,7 @@
 """Agents that walk in the heard direction, with exact senses and with made-up ones."""
 
+import math
+
 import numpy as np
 import pytest
 import torch
@@ -64,6 +66,18 @@ def test_it_stops_where_the_heard_length_is_surely_short():
     assert not (first_action(agent, VAR, heard) == STOPS).any()
 
 
+def test_the_probability_that_stop_needs_halves():
+    """It hears a length of 1.5 m with a standard deviation of 0.5: it is below 0.9 m with 0.15."""
+    share = torch.special.ndtr(torch.tensor(math.log(0.9 / 1.5) / 0.5)).item()
+    agent = follower(stop_within=0.9, stop_above=0.8, stop_half_life=5)
+    agent.reset(1, torch.Generator(), STOP)
+    for step in range(1, 100):
+        heard = observation(arrival([0], 1.5, sigma=0.5), (0, step, 0))
+        if int(agent.act(heard)) == STOPS:
+            break
+    assert step == math.ceil(5 * math.log2(0.8 / share))
+
+
 def test_a_place_where_directions_contradict_each_other_is_left():
     agent = follower(max_rotations=2)
     agent.reset(1, torch.Generator(), VAR)
@@ -76,9 +90,15 @@ def test_a_place_where_directions_contradict_each_other_is_left():
 
 
 def test_settings_out_of_range_or_without_effect_are_named():
-    assert {"source_filter", "error", "stop_within"} <= set(follower().unused_settings(VAR))
+    unused = {"source_filter", "error", "stop_within", "stop_half_life"}
+    assert unused <= set(follower().unused_settings(VAR))
     assert "stop_within" not in follower().unused_settings(STOP)
     assert "stop_probability" not in follower().wants(STOP)
-    for key, value in (("ahead", 0.5), ("stop_within", 0), ("stop_above", 1)):
+    for key, value in (
+        ("ahead", 0.5),
+        ("stop_within", 0),
+        ("stop_above", 1),
+        ("stop_half_life", 0),
+    ):
         with pytest.raises(UserError, match=rf"planner\.{key}: {value}"):
             follower(**{key: value})

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from avn.agents.planner_agent import PlannerAgent
+from avn.agents.stop_threshold import check_half_life, stop_threshold
 from avn.apartments.floor_plan import CELL
 from avn.core.actions import ROTATE_RIGHT, STOP
 from avn.core.errors import UserError
@@ -97,10 +98,7 @@ class BeliefAgent(PlannerAgent):
         if silent_after < 1:
             raise UserError(f"planner.silent_after: {silent_after}; give actions, 1 or more")
         self.silent_after = silent_after
-        if stop_half_life is not None and not stop_half_life > 0:
-            raise UserError(
-                f"planner.stop_half_life: {stop_half_life}; give actions, more than 0, or null"
-            )
+        check_half_life(stop_half_life)
         if not least_information >= 0:
             raise UserError(f"planner.least_information: {least_information}; give nats, 0 or more")
         if direct_path not in DIRECT_PATHS:
@@ -187,9 +185,7 @@ class BeliefAgent(PlannerAgent):
             return super()._stops(observation)
         assert self._belief is not None
         position = self.mapper.pose[:, :2].numpy()
-        enough = self.stop_above
-        if self.stop_half_life is not None:
-            enough *= 0.5 ** (self._actions / self.stop_half_life)
+        enough = stop_threshold(self.stop_above, self.stop_half_life, self._actions)
         stops = self._belief.near(position, self._goal, self._active) >= enough
         # nothing more will be learnt: the likeliest square is the best guess
         ended = (self._silent >= self.silent_after) & self._belief.informed()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from avn.agents.planner_agent import PlannerAgent
+from avn.agents.stop_threshold import check_half_life, stop_threshold
 from avn.apartments.floor_plan import CELL
 from avn.core.actions import HEADINGS
 from avn.core.errors import UserError
@@ -39,6 +40,8 @@ class HearingAgent(PlannerAgent):
     stop_above : float
         Probability of such a length, by the heard distribution, from which it stops; more than 0
         and below 1.
+    stop_half_life : float or None
+        Actions after which `stop_above` has halved, more than 0; None for never.
     least_information : float
         Information of a direction of arrival, in nats, below which nothing counts as heard, 0 or
         more; the agent then keeps what it heard before.
@@ -56,6 +59,7 @@ class HearingAgent(PlannerAgent):
         mapper: Mapper,
         stop_within: float = 0.9,
         stop_above: float = 0.5,
+        stop_half_life: float | None = None,
         least_information: float = 0.0,
         **planner: Any,
     ) -> None:
@@ -66,9 +70,11 @@ class HearingAgent(PlannerAgent):
             )
         if not 0 < stop_above < 1:
             raise UserError(f"planner.stop_above: {stop_above}; give more than 0 and less than 1")
+        check_half_life(stop_half_life)
         if not least_information >= 0:
             raise UserError(f"planner.least_information: {least_information}; give nats, 0 or more")
         self.stop_within, self.stop_above = stop_within, stop_above
+        self.stop_half_life = stop_half_life
         self.least_information = least_information
         self.needs = ("arrival", *mapper.needs)  # type: ignore[misc]
 
@@ -78,7 +84,7 @@ class HearingAgent(PlannerAgent):
 
     def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
         """Return the settings of the source filter, and those of Stop that do not count."""
-        stop = () if protocol.requires_stop else ("stop_within", "stop_above")
+        stop = () if protocol.requires_stop else ("stop_within", "stop_above", "stop_half_life")
         return ("source_filter", "error", *stop)
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
@@ -86,11 +92,13 @@ class HearingAgent(PlannerAgent):
         super().reset(n, generator, protocol)
         # direction on the map, turns clockwise from its front
         self._heard = np.zeros(n)
+        self._actions = 0
         self._informed = np.zeros(n, dtype=np.bool_)
 
     def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
         heard = Arrivals(observation["arrival"].float())
         pose = self.mapper.pose
+        self._actions += 1
         if self._source_belief is None:
             size = self.mapper.graph.cost.shape[1]
             self._source_belief = SourceBelief(self.n, size, "latest", SourceErrorModel())
@@ -114,7 +122,8 @@ class HearingAgent(PlannerAgent):
         heard = Arrivals(observation["arrival"].float())
         mean, sigma = heard.distance.unbind(-1)
         within = torch.special.ndtr((math.log(self.stop_within) - mean) / sigma)
-        return (within >= self.stop_above) & (heard.information >= self.least_information)
+        enough = stop_threshold(self.stop_above, self.stop_half_life, self._actions)
+        return (within >= enough) & (heard.information >= self.least_information)
 
     def _on_map(self, metres: Tensor, heading: Tensor) -> NDArray[np.float64]:
         """Return the column and row of places (N, 2) in metres to the agents' right and front."""
