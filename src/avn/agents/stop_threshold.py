@@ -12,5 +12,15 @@ def check_half_life(half_life: float | None) -> None:
 
 
 def stop_threshold(above: float, half_life: float | None, actions: int) -> float:
-    """Return `above`, halved each time that `half_life` actions have passed; never for None."""
+    """Return the probability from which an agent stops after a number of actions.
+
+    Parameters
+    ----------
+    above : float
+        Probability at the start.
+    half_life : float or None
+        Actions after which it has halved; None if it stays.
+    actions : int
+        Actions of the episode so far.
+    """
     return above if half_life is None else above * 0.5 ** (actions / half_life)
