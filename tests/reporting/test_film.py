@@ -6,10 +6,13 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from drawn_walks import clips, hearing, ours, views, walked
+import torch
+from drawn_walks import FLAT, clips, hearing, ours, views, walked
 
 from avn.agents.random_walk import RandomWalk
 from avn.core.errors import UserError
+from avn.core.sound_mix import SoundMix
+from avn.navigation.navigation_scene import draw
 from avn.navigation.trace import Trace
 from avn.pipeline.observed import soundtrack
 from avn.reporting.film import FPS, SIZE, frames, write_film
@@ -68,6 +71,22 @@ def test_the_posterior_is_on_the_map_at_each_step() -> None:
     changed = np.abs(dots - none).any(-1)
     assert changed.any((1, 2)).all()
     assert (changed[0] != changed[-1]).any(), "the dots move"
+
+
+def test_a_distractor_is_on_the_map() -> None:
+    scene = draw("flat", FLAT.replace("a", "A", 1))
+    steady = SoundMix.steady(100)
+    mixed = steady._replace(other_source=torch.ones(100, dtype=torch.int64))
+    trace = replace(walked(ours(), [0])[0], scene=scene)
+    assert trace.goal.tolist() == [6.5, 1.5], "the place of the source is the same in this flat"
+    shown, plain = (
+        next(frames(replace(trace, mix=mix), "ours", views(trace), clips(trace)))
+        for mix in (mixed.rows(slice(len(trace.state))), steady.rows(slice(len(trace.state))))
+    )
+    rows, columns = (shown != plain).any(-1)[100:650, 490:].nonzero()
+    assert rows.size
+    assert rows.mean() < 225, "it is in the north"
+    assert columns.mean() < 390, "and in the west"
 
 
 def test_an_agent_without_ears_or_map_is_filmed_too(tmp_path: Path) -> None:

@@ -1,10 +1,24 @@
 import numpy as np
 import pytest
-from drawn_walks import ours, walked
+from drawn_walks import FLAT, ours, walked
+from small_places import STOP
 
 from avn.agents.greedy import Greedy
 from avn.agents.random_walk import RandomWalk
-from avn.reporting.trajectory_figures import RUN_COLOURS, estimate_figure, trajectory_figure
+from avn.agents.recorder import Recorder
+from avn.agents.rollout import Labels, records, rollout
+from avn.navigation.distractor import Distractor
+from avn.navigation.dynamics import Dynamics
+from avn.navigation.episodes import exhaustive_episodes
+from avn.navigation.navigation_scene import draw
+from avn.navigation.simulator import Simulator
+from avn.navigation.trace import Trace
+from avn.reporting.trajectory_figures import (
+    RUN_COLOURS,
+    estimate_figure,
+    outcome,
+    trajectory_figure,
+)
 
 
 def test_each_run_has_its_line_in_each_episode() -> None:
@@ -23,6 +37,41 @@ def test_each_run_has_its_line_in_each_episode() -> None:
         assert labels[0].startswith("ours: success")
         assert "scene" not in axes.get_title()
         assert "episode" in axes.get_title()
+
+
+def beside_a_distractor() -> list[Trace]:
+    """Traces of a random walk in a flat with two sources, one of which is the distractor."""
+    scene = draw("flat", FLAT.replace("a", "A", 1))
+    episodes = exhaustive_episodes(scene, ["bark", "ring"], STOP, 0)
+    dynamics = Dynamics(distractor=Distractor({"bark": "dog", "ring": "telephone"}))
+    world = Simulator(scene, episodes, STOP, None, dynamics)
+    recorder = Recorder({"flat": range(len(world))}, 1, beliefs=False)
+    rollout(RandomWalk(), world, recorder)
+    rows = records(world, Labels("random_walk", "resonance")).to_dict("records")
+    return [recorder.trace("flat", row, rows[row]) for row in range(len(world))]
+
+
+def test_a_distractor_is_a_diamond_where_it_is() -> None:
+    traces = beside_a_distractor()
+    places = traces[0].scene.grid.centres[traces[0].scene.sources]
+    assert {trace.source for trace in traces} == {0, 1}
+    for trace in traces[:: len(traces) // 7]:
+        assert trace.distractor == pytest.approx(places[1 - trace.source])
+        figure = trajectory_figure([[trace]], ["random_walk"])
+        diamonds = [line for line in figure.axes[0].lines if line.get_marker() == "D"]
+        assert [line.get_xydata()[0].tolist() for line in diamonds] == [trace.distractor.tolist()]
+        assert "distractor" in [text.get_text() for text in figure.legends[0].get_texts()]
+        word = outcome(trace).split(",")[0]
+        assert (word == "stopped at the distractor") == bool(trace.record["stopped_at_distractor"])
+    assert any(trace.record["stopped_at_distractor"] for trace in traces)
+
+
+def test_without_a_distractor_there_is_no_diamond() -> None:
+    trace = walked(ours(), [0])[0]
+    assert trace.distractor is None
+    figure = trajectory_figure([[trace]], ["ours"])
+    assert all(line.get_marker() != "D" for line in figure.axes[0].lines)
+    assert "distractor" not in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_estimates_are_drawn_where_they_were_heard() -> None:

@@ -106,3 +106,10 @@ class Trace:
             walk = self.mix.place.numpy() - len(sources)
             cells = np.where(self.mix.place.numpy() < 0, cells, walk)
         return self.scene.grid.centres[cells]
+
+    @property
+    def distractor(self) -> NDArray[np.float64] | None:
+        """Position of the distractor, metres east and north, (2,); None without one."""
+        if self.mix is None or self.mix.other_source[0] < 0:
+            return None
+        return self.scene.grid.centres[self.scene.sources[int(self.mix.other_source[0])]]

@@ -225,7 +225,11 @@ def memory_figure(trace: Trace, name: str, caption: str = "") -> Figure:
         "lw": 1.2,
         "label": "from the agent to that entry",
     }
-    handles = [*left.get_legend_handles_labels()[0], Line2D([], [], **lines), *marker_handles()]
+    handles = [
+        *left.get_legend_handles_labels()[0],
+        Line2D([], [], **lines),
+        *marker_handles(trace),
+    ]
     left.legend(
         handles=handles, loc="upper left", bbox_to_anchor=(0, 0), frameon=False, fontsize=8, ncols=2
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,8 +24,15 @@ from avn.core.files import atomic_write
 from avn.modules.spectrogram import Spectrogram
 from avn.navigation.trace import BeliefTrace, Trace
 from avn.reporting.belief_figures import DOTS, SOURCE, WALKED, draw_posterior, posterior_areas
-from avn.reporting.sound_figures import draw_plan
-from avn.reporting.trajectory_figures import draw_apartment, extent, outcome, plan_of, title_of
+from avn.reporting.sound_figures import draw_plan, frequency_ticks
+from avn.reporting.trajectory_figures import (
+    DISTRACTOR,
+    draw_apartment,
+    extent,
+    outcome,
+    plan_of,
+    title_of,
+)
 
 # Frames per second. Only the cursor on the spectrograms moves within a second.
 FPS = 5
@@ -130,15 +136,6 @@ def frames(
             yield stage.with_cursor(picture, beat / FPS)
 
 
-def _frequency_ticks(rate: int, bands: int) -> tuple[list[float], list[str]]:
-    """Return rows and labels of some frequencies in a mel spectrogram with the lowest band last."""
-    shown = [hertz for hertz in (500, 2000, 6000) if hertz < rate / 2]
-    # the centres of the bands are evenly spaced in mel; see `avn.modules.spectrogram.band_weights`
-    shares = [math.log1p(hertz / 700) / math.log1p(rate / 1400) for hertz in shown]
-    places = [bands - share * (bands + 1) for share in shares]
-    return places, [f"{hertz / 1000:g}" for hertz in shown]
-
-
 class _Stage:
     """Figure on which all frames are drawn."""
 
@@ -160,7 +157,7 @@ class _Stage:
             style: dict[str, Any] = {"aspect": "auto", "cmap": "magma", "vmin": low, "vmax": high}
             self.sounds.append(axes.imshow(self.pictures[0, ear], **style))
             axes.set_ylabel(f"{word} ear, kHz", fontsize=9)
-            places, labels = _frequency_ticks(rate, spectrogram.bands)
+            places, labels = frequency_ticks(rate, spectrogram.bands)
             axes.set_yticks(places, labels, fontsize=8)
         ends = [-0.5, columns / 2 - 0.5, columns - 0.5]
         self.ears[1].set_xticks(ends, ["0", "0.5", "1 s"], fontsize=8)
@@ -217,6 +214,8 @@ class _Stage:
             walk = centres[trace.exploration_trajectory // HEADINGS]
             axes.plot(*walk.T, color="0.45", lw=0.9, zorder=7)
             (self.recalled,) = axes.plot([], [], "o", color="#7b3294", ms=8, alpha=0.8, zorder=8)
+        if trace.distractor is not None:
+            axes.plot(*trace.distractor, "D", zorder=12, **DISTRACTOR)
         star: dict[str, Any] = {"color": "#ffb000", "mec": "black", "markersize": 17}
         (self.source,) = axes.plot([], [], "*", zorder=12, **star)
         (self.path,) = axes.plot([], [], color=WALKED, lw=2.6, zorder=9)
@@ -229,6 +228,8 @@ class _Stage:
 
     def _legend(self) -> None:
         words = ["star: source", "triangle: agent, pink: its path"]
+        if self.trace.distractor is not None:
+            words.append("grey diamond: distractor")
         if self.trace.collided.any():
             words.append("black x: collision")
         if self.trace.source_estimates is not None:

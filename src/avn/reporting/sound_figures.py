@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import wave
 from typing import Any
 
@@ -111,6 +112,15 @@ def location_figure(
     axes.set_title(title)
     axes.legend(loc="upper left", bbox_to_anchor=(0, -0.1), frameon=False)
     return figure
+
+
+def frequency_ticks(rate: int, bands: int) -> tuple[list[float], list[str]]:
+    """Return rows and labels of some frequencies in a mel spectrogram with the lowest band last."""
+    shown = [hertz for hertz in (500, 2000, 6000) if hertz < rate / 2]
+    # the centres of the bands are evenly spaced in mel; see `avn.modules.spectrogram.band_weights`
+    shares = [math.log1p(hertz / 700) / math.log1p(rate / 1400) for hertz in shown]
+    places = [bands - share * (bands + 1) for share in shares]
+    return places, [f"{hertz / 1000:g}" for hertz in shown]
 
 
 def spectrogram_figure(pictures: Tensor, title: str) -> Figure:

@@ -24,6 +24,8 @@ from avn.reporting.floor_plan_figure import draw_floor_plan
 RUN_COLOURS = ("#d1495b", "#1f6fb2", "#3a9a5b", "#8a5fbf", "#c98a1b", "#4d4d4d")
 # Style of the source's star.
 _SOURCE: dict[str, Any] = {"color": "#ffb000", "mec": "black", "mew": 0.8, "markersize": 15}
+# Style of the distractor's diamond.
+DISTRACTOR: dict[str, Any] = {"color": "0.6", "mec": "black", "mew": 0.8, "markersize": 10}
 FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
 
 
@@ -33,8 +35,10 @@ def plan_of(trace: Trace) -> FloorPlan | None:
 
 
 def draw_place(axes: Axes, trace: Trace) -> None:
-    """Draw a trace's apartment in faint colours, in metres, and the source at the end."""
+    """Draw a trace's apartment in faint colours, the source at the end, and a distractor."""
     draw_apartment(axes, trace.scene)
+    if trace.distractor is not None:
+        axes.plot(*trace.distractor, "D", zorder=12, **DISTRACTOR)
     if (trace.goals != trace.goal).any():
         axes.plot(*trace.goals.T, ":", color="#c98a1b", lw=1.5, zorder=6)
     axes.plot(*trace.goals[-1], "*", zorder=12, **_SOURCE)
@@ -99,11 +103,8 @@ def draw_walk(
         axes.plot(*path[-1], "X", color=colour, mec="white", markersize=10, zorder=11)
 
 
-def marker_handles(estimate: bool = False) -> list[Line2D]:
-    """Return the legend of the markers of a path; with `estimate`, that of a source estimate too.
-
-    They are those of `draw_walk` and `draw_place`, in grey.
-    """
+def marker_handles(trace: Trace) -> list[Line2D]:
+    """Return the legend of the markers of `draw_walk` and `draw_place` for a trace, in grey."""
     grey: dict[str, Any] = {"color": "0.4", "linestyle": "none"}
     handles = [
         Line2D([], [], marker="o", mfc="white", mew=2, markersize=8, label="start", **grey),
@@ -112,8 +113,8 @@ def marker_handles(estimate: bool = False) -> list[Line2D]:
         Line2D([], [], marker="x", markersize=5, label="collision", **grey),
         Line2D([], [], marker="*", label="source", **(grey | _SOURCE)),
     ]
-    if estimate:
-        handles.append(Line2D([], [], marker="P", markersize=9, label="source estimate", **grey))
+    if trace.distractor is not None:
+        handles.append(Line2D([], [], marker="D", label="distractor", **(grey | DISTRACTOR)))
     return handles
 
 
@@ -140,7 +141,7 @@ def trajectory_figure(
     -------
     Figure
         A panel for each episode: ring at the start, square at a successful end, cross at a failed
-        one, small crosses at collisions, star at the source.
+        one, small crosses at collisions, star at the source, diamond at the distractor.
     """
     columns = min(2, len(episodes))
     rows = -(-len(episodes) // columns)
@@ -158,13 +159,13 @@ def trajectory_figure(
         axes.legend(
             loc="upper left", bbox_to_anchor=(0, 0), frameon=False, fontsize=9, borderaxespad=0.2
         )
-    _add_markers(figure, 5 if columns > 1 else 3)
+    _add_markers(figure, 5 if columns > 1 else 3, episodes[0][0])
     return figure
 
 
-def _add_markers(figure: Figure, columns: int, estimate: bool = False) -> None:
+def _add_markers(figure: Figure, columns: int, trace: Trace) -> None:
     """Add the legend of the markers above all panels."""
-    handles = marker_handles(estimate)
+    handles = marker_handles(trace)
     figure.legend(
         handles=handles, loc="outside upper left", ncols=columns, frameon=False, fontsize=9
     )
@@ -193,7 +194,7 @@ def estimate_figure(trace: Trace, name: str, caption: str = "") -> Figure:
     left, right = figure.subplots(1, 2, width_ratios=(1.35, 1))
     draw_place(left, trace)
     draw_walk(left, trace, "#777777")
-    _add_markers(figure, 5)
+    _add_markers(figure, 5, trace)
     steps = np.arange(len(trace.source_estimates))
     style: dict[str, Any] = {"c": steps, "cmap": "viridis", "zorder": 8}
     lines = np.stack((trace.path, trace.source_estimates), axis=1)
@@ -241,6 +242,8 @@ def title_of(trace: Trace) -> str:
 def outcome(trace: Trace) -> str:
     """Describe the outcome of an episode: result, SPL and number of actions."""
     word = str(trace.record["outcome"]).replace("_", " ")
+    if trace.record.get("stopped_at_distractor"):
+        word = "stopped at the distractor"
     return f"{word}, SPL {trace.record['spl']:.2f}, {len(trace.action)} actions"
 
 
