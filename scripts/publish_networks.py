@@ -42,7 +42,12 @@ RUNS = [
     *([f"agent={row}", "acoustics=resonance"] for row in ACTOR_CRITICS),
     # three networks, as the table of conditions has
     *(
-        ["agent=belief", "acoustics=diffraction", "protocol=stop", f"train_seed={seed}"]
+        [f"agent={row}", world, "protocol=stop", f"train_seed={seed}"]
+        for row, world in (
+            ("belief", "acoustics=diffraction"),
+            ("belief", "acoustics=resonance"),
+            ("belief_told", "acoustics=diffraction"),
+        )
         for seed in range(3)
     ),
 ]
