@@ -115,7 +115,10 @@ def location_figure(
 
 
 def frequency_ticks(rate: int, bands: int) -> tuple[list[float], list[str]]:
-    """Return rows and labels of some frequencies in a mel spectrogram with the lowest band last."""
+    """Return rows and labels (kHz) of some frequencies in a mel spectrogram, lowest band last.
+
+    `rate` is the sampling rate in Hz, `bands` the number of rows.
+    """
     shown = [hertz for hertz in (500, 2000, 6000) if hertz < rate / 2]
     # the centres of the bands are evenly spaced in mel; see `avn.modules.spectrogram.band_weights`
     shares = [math.log1p(hertz / 700) / math.log1p(rate / 1400) for hertz in shown]

@@ -242,7 +242,8 @@ def title_of(trace: Trace) -> str:
 def outcome(trace: Trace) -> str:
     """Describe the outcome of an episode: result, SPL and number of actions."""
     word = str(trace.record["outcome"]).replace("_", " ")
-    if trace.record.get("stopped_at_distractor"):
+    # a Stop near both sources is a success
+    if trace.record.get("stopped_at_distractor") and not trace.record["success"]:
         word = "stopped at the distractor"
     return f"{word}, SPL {trace.record['spl']:.2f}, {len(trace.action)} actions"
 
