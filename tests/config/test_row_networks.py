@@ -23,7 +23,7 @@ from avn.core.errors import UserError
     ],
 )
 def test_the_network_is_that_of_the_row_unless_one_is_given(given, network):
-    cfg, _ = compose_command("train", with_row_networks(given.split()))
+    cfg, _ = compose_command("train", given.split())
     node = {"occupancy_cnn": "occupancy_model", "stop_classifier": "stop_model"}
     assert cfg[node.get(cfg.model.name, "sound_model")].name == network
 

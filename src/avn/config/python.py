@@ -12,6 +12,7 @@ from omegaconf import DictConfig
 from avn.config import option_files, registry
 from avn.config.cli import arrange, check_keys, explain
 from avn.config.folder import conf_folder
+from avn.config.row_networks import with_row_networks
 from avn.core import numerics
 from avn.core.errors import UserError
 
@@ -57,6 +58,8 @@ def compose_command(command: str, overrides: Sequence[str]) -> tuple[DictConfig,
         given = arrange(option_files.take_folders([str(own) for own in overrides]))
         if "--multirun" in given:
             raise UserError("overrides: -m is of the command line alone; remove it")
+        if command == "train":
+            given = with_row_networks(given)
         with composing():
             cfg = compose(command, overrides=given)
         check_keys(cfg)
