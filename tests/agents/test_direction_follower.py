@@ -78,6 +78,20 @@ def test_the_probability_that_stop_needs_halves():
     assert step == math.ceil(5 * math.log2(0.8 / share))
 
 
+def test_it_stops_where_it_is_once_the_sound_has_ended():
+    """It hears for three actions, and hears nothing after them or from the beginning."""
+    silence = arrival([0])
+    silence[:, :BINS] = -math.log(BINS)
+    for heard_before, protocol, last in ((3, STOP, 8), (0, STOP, 40), (3, VAR, 40)):
+        agent = follower(least_information=0.08, silent_after=5)
+        agent.reset(1, torch.Generator(), protocol)
+        for step in range(1, 41):
+            heard = arrival([0]) if step <= heard_before else silence
+            if int(agent.act(observation(heard, (0, 0, 0)))) == STOPS:
+                break
+        assert step == last
+
+
 def test_a_place_where_directions_contradict_each_other_is_left():
     agent = follower(max_rotations=2)
     agent.reset(1, torch.Generator(), VAR)
@@ -90,7 +104,7 @@ def test_a_place_where_directions_contradict_each_other_is_left():
 
 
 def test_settings_out_of_range_or_without_effect_are_named():
-    unused = {"source_filter", "error", "stop_within", "stop_half_life"}
+    unused = {"source_filter", "error", "stop_within", "stop_half_life", "silent_after"}
     assert unused <= set(follower().unused_settings(VAR))
     assert "stop_within" not in follower().unused_settings(STOP)
     assert "stop_probability" not in follower().wants(STOP)
@@ -99,6 +113,7 @@ def test_settings_out_of_range_or_without_effect_are_named():
         ("stop_within", 0),
         ("stop_above", 1),
         ("stop_half_life", 0),
+        ("silent_after", 0),
     ):
         with pytest.raises(UserError, match=rf"planner\.{key}: {value}"):
             follower(**{key: value})

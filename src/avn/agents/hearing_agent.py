@@ -45,6 +45,9 @@ class HearingAgent(PlannerAgent):
     least_information : float
         Information of a direction of arrival, in nats, below which nothing counts as heard, 0 or
         more; the agent then keeps what it heard before.
+    silent_after : int
+        Actions in a row without hearing anything after which the sound counts as ended, 1 or more:
+        the agent then stops where it is, for protocols with Stop.
     **planner
         Other parameters of `PlannerAgent`, without those of its source filter.
 
@@ -61,6 +64,7 @@ class HearingAgent(PlannerAgent):
         stop_above: float = 0.5,
         stop_half_life: float | None = None,
         least_information: float = 0.0,
+        silent_after: int = 8,
         **planner: Any,
     ) -> None:
         super().__init__(mapper, **planner)
@@ -73,6 +77,9 @@ class HearingAgent(PlannerAgent):
         check_half_life(stop_half_life)
         if not least_information >= 0:
             raise UserError(f"planner.least_information: {least_information}; give nats, 0 or more")
+        if silent_after < 1:
+            raise UserError(f"planner.silent_after: {silent_after}; give actions, 1 or more")
+        self.silent_after = silent_after
         self.stop_within, self.stop_above = stop_within, stop_above
         self.stop_half_life = stop_half_life
         self.least_information = least_information
@@ -84,7 +91,8 @@ class HearingAgent(PlannerAgent):
 
     def unused_settings(self, protocol: Protocol) -> tuple[str, ...]:
         """Return the settings of the source filter, and those of Stop that do not count."""
-        stop = () if protocol.requires_stop else ("stop_within", "stop_above", "stop_half_life")
+        stops = ("stop_within", "stop_above", "stop_half_life", "silent_after")
+        stop = () if protocol.requires_stop else stops
         return ("source_filter", "error", *stop)
 
     def reset(self, n: int, generator: torch.Generator, protocol: Protocol) -> None:
@@ -92,7 +100,7 @@ class HearingAgent(PlannerAgent):
         super().reset(n, generator, protocol)
         # direction on the map, turns clockwise from its front
         self._heard = np.zeros(n)
-        self._actions = 0
+        self._actions, self._silent = 0, np.zeros(n, dtype=np.int64)
         self._informed = np.zeros(n, dtype=np.bool_)
 
     def _update_source(self, observation: TensorDict, active: np.ndarray) -> None:
@@ -105,6 +113,7 @@ class HearingAgent(PlannerAgent):
         # Directions heard with different headings at one place may contradict each other.
         updated = active & (self._turns < self.max_rotations).numpy()
         audible = (heard.information >= self.least_information).numpy()
+        self._silent = np.where(audible, 0, self._silent + 1)
         # before anything was heard, any direction will do
         updated &= audible | ~self._informed
         self._informed |= audible
@@ -123,7 +132,10 @@ class HearingAgent(PlannerAgent):
         mean, sigma = heard.distance.unbind(-1)
         within = torch.special.ndtr((math.log(self.stop_within) - mean) / sigma)
         enough = stop_threshold(self.stop_above, self.stop_half_life, self._actions)
-        return (within >= enough) & (heard.information >= self.least_information)
+        near = (within >= enough) & (heard.information >= self.least_information)
+        # nothing more will be learnt
+        ended = (self._silent >= self.silent_after) & self._informed
+        return near | torch.from_numpy(ended)
 
     def _on_map(self, metres: Tensor, heading: Tensor) -> NDArray[np.float64]:
         """Return the column and row of places (N, 2) in metres to the agents' right and front."""
