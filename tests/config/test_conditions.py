@@ -51,6 +51,17 @@ def test_no_sound_or_noise_of_a_condition_is_one_of_training(condition):
         }
 
 
+def test_training_has_white_noise_and_all_noises_of_a_household_of_its_split():
+    noises = list(composed("agent=belief").training.microphone.noises)
+    of_training = {
+        name
+        for name, sound in packaged_sounds().items()
+        if sound.split == "train" and sound.category in ("appliance", "fire", "water")
+    }
+    assert len(noises) == len(set(noises))
+    assert set(noises) == {"white"} | of_training
+
+
 def test_every_condition_has_a_column_and_the_command_line_wins():
     assert set(TABLE["conditions"]) == {*NAMES} - {"none"}
     cfg, _ = compose_command("eval", ["condition=unheard", "sound=alarm"])
