@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from avn.acoustics.clips import ClipRenderer, DrySounds, brir_spectra
+from avn.acoustics.diffuse_noise_microphone import DiffuseNoiseMicrophone
 from avn.acoustics.microphone import Microphone
-from avn.acoustics.noisy_microphone import NoisyMicrophone
 from avn.core.clip_id import ClipId
 from avn.core.errors import UserError
 
@@ -35,7 +35,7 @@ def decibels(ratio):
 @pytest.mark.parametrize("snr", [20.0, 0.0])
 def test_the_ratio_is_that_of_the_powers_of_the_clip(bank, noises, snr):
     dry = clips(bank, Microphone(noise_rms=0.0))
-    noisy = NoisyMicrophone(snr=(snr, snr), noises=noises, noise_rms=0.0)
+    noisy = DiffuseNoiseMicrophone(snr=(snr, snr), noises=noises, noise_rms=0.0)
     noise = clips(bank, noisy) - dry
     found = decibels(dry.square().mean((1, 2)) / noise.square().mean((1, 2)))
     assert abs(float(found.mean()) - snr) < 0.5
@@ -46,7 +46,7 @@ def test_the_ratio_is_that_of_the_powers_of_the_clip(bank, noises, snr):
 
 def test_levels_and_ratios_are_spread_evenly_and_belong_to_the_clip(bank):
     quiet = {"noise_rms": 0.0}
-    varied = NoisyMicrophone(level=(-12, 12), snr=(200, 200), **quiet)
+    varied = DiffuseNoiseMicrophone(level=(-12, 12), snr=(200, 200), **quiet)
     level = decibels(
         clips(bank, varied).square().mean((1, 2))
         / clips(bank, Microphone(**quiet)).square().mean((1, 2))
@@ -54,14 +54,15 @@ def test_levels_and_ratios_are_spread_evenly_and_belong_to_the_clip(bank):
     assert float(level.min()) > -12.01
     assert float(level.max()) < 12.01
     assert abs(float(level.std()) - 24 / 12**0.5) < 1.2, "uniform over 24 dB"
-    some = NoisyMicrophone(level=(-12, 12), snr=(0, 40), noises=["white", "appliance_hood"])
+    some = DiffuseNoiseMicrophone(level=(-12, 12), snr=(0, 40), noises=["white", "appliance_hood"])
     assert torch.equal(clips(bank, some), clips(bank, some))
     shifted = clips(bank, some, first=COUNT // 2)
     torch.testing.assert_close(clips(bank, some)[COUNT // 2 :], shifted[: COUNT // 2])
 
 
 def test_a_share_of_the_clips_is_the_noise_alone(bank):
-    both = [NoisyMicrophone(snr=(10, 10), noise_rms=0.0, silent=share) for share in (0.0, 0.25)]
+    ratio = {"snr": (10, 10), "noise_rms": 0.0}
+    both = [DiffuseNoiseMicrophone(silent=share, **ratio) for share in (0.0, 0.25)]
     whole, some = (torch.cat([clips(bank, own, COUNT * k) for k in range(8)]) for own in both)
     same = (whole == some).all(-1).all(-1)
     assert abs(float((~same).float().mean()) - 0.25) < 4 * (0.25 * 0.75 / len(whole)) ** 0.5
@@ -70,7 +71,7 @@ def test_a_share_of_the_clips_is_the_noise_alone(bank):
 
 
 def test_the_noise_of_a_clip_has_no_seam(bank):
-    low = NoisyMicrophone(snr=(0, 0), noises=["appliance_furnace"], noise_rms=0.0)
+    low = DiffuseNoiseMicrophone(snr=(0, 0), noises=["appliance_furnace"], noise_rms=0.0)
     noise = clips(bank, low) - clips(bank, Microphone(noise_rms=0.0))
     steps = (noise - noise.roll(1, -1)).abs()
     assert float(steps[..., 0].mean()) < 2 * float(steps.mean())
@@ -90,4 +91,4 @@ def test_the_noise_of_a_clip_has_no_seam(bank):
 )
 def test_what_cannot_work_is_named(given, named):
     with pytest.raises(UserError, match=named):
-        NoisyMicrophone(**given)
+        DiffuseNoiseMicrophone(**given)

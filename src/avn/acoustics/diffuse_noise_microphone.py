@@ -24,7 +24,7 @@ _FADE = 0.01  # seconds of cross-fade at the wrap-around of a clip
 _MOST = 200.0  # decibels
 
 
-class NoisyMicrophone(Microphone):
+class DiffuseNoiseMicrophone(Microphone):
     """Two microphones in a diffuse field of noise, with random levels of sound and noise.
 
     Of each clip are drawn its level, its signal-to-noise ratio and the kind of its noise. The
