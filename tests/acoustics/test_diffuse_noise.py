@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import csd, welch
 
-from avn.acoustics.diffuse_noise import EARS, diffuse_noise
+from avn.acoustics.diffuse_noise import EARS, diffuse_noise, independent_shift
+from avn.acoustics.dry_sounds import load_sounds
 from avn.acoustics.materials import SPEED_OF_SOUND
 
 RATE = 16000
@@ -12,7 +13,7 @@ RATE = 16000
 
 @pytest.fixture(scope="module")
 def white():
-    return np.random.default_rng(1).standard_normal(60 * RATE).astype(np.float32)
+    return np.random.default_rng(1).standard_normal(20 * RATE).astype(np.float32)
 
 
 @pytest.mark.parametrize("distance", [EARS, 0.05])
@@ -51,10 +52,48 @@ def test_a_recording_that_repeats_is_diffuse_as_well(white, times):
     assert np.abs(10 * np.log10(powers[0] / powers[1])).max() < 1, "as loud at both ears"
 
 
-def test_a_click_stays_finite():
-    click = np.zeros(2 * RATE, np.float32)
-    click[100] = 1
-    assert np.isfinite(diffuse_noise(click, RATE)).all()
+def octave_levels(wave):
+    power = np.abs(np.fft.rfft(wave)) ** 2
+    frequency = np.fft.rfftfreq(len(wave), 1 / RATE)
+    edges = 62.5 * 2.0 ** np.arange(8)
+    return 10 * np.log10(
+        [power[(frequency >= low) & (frequency < 2 * low)].sum() for low in edges[:-1]]
+    )
+
+
+@pytest.mark.parametrize("name", ["water_running", "appliance_mixer", "appliance_vacuum"])
+def test_each_ear_has_the_octaves_of_the_recording(name):
+    wave = load_sounds({name: name}, RATE)[name]
+    wanted = octave_levels(wave / np.sqrt(np.mean(wave**2)))
+    for ear in diffuse_noise(wave, RATE):
+        np.testing.assert_allclose(octave_levels(ear), wanted, atol=0.3)
+
+
+@pytest.mark.parametrize("count", [2, 3, 9, 4001])
+def test_a_tone_that_cancels_stays_finite(count):
+    # nothing is left of it in the sum or in the difference
+    wave = np.cos(np.pi * np.arange(count)).astype(np.float32)
+    assert np.isfinite(diffuse_noise(wave, 2000, 0.1715)).all()
+
+
+def test_the_shift_is_that_at_which_all_octaves_differ(white):
+    # the low half repeats after 3/8, the high half after 5/16 of the length
+    count = 16 * 4000
+    low, high = (np.fft.rfft(white[k * count : (k + 1) * count]) for k in range(2))
+    half = len(low) // 16
+    low[half:], high[:half] = 0, 0
+    wave = sum(
+        np.fft.irfft(own, count) + np.roll(np.fft.irfft(own, count), shift)
+        for own, shift in ((low, count * 3 // 8), (high, count * 5 // 16))
+    )
+    found = independent_shift(wave, RATE)
+    assert count // 4 <= found <= count // 2
+    for octave in range(7):
+        band = np.fft.rfft(wave)
+        frequency = np.fft.rfftfreq(count, 1 / RATE)
+        band[(frequency < 62.5 * 2**octave) | (frequency >= 125 * 2**octave)] = 0
+        part = np.fft.irfft(band, count)
+        assert abs(np.corrcoef(part, np.roll(part, found))[0, 1]) < 0.1
 
 
 def test_a_hum_is_as_loud_at_both_ears():

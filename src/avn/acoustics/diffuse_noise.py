@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
@@ -23,12 +25,13 @@ def diffuse_noise(
 ) -> NDArray[np.float32]:
     """Make noise of a spherically isotropic field at two points from a recording.
 
-    The spectrum of each point, smoothed over 10 Hz, is that of the recording. The coherence of
-    the two is that of the field, sin(k d) / (k d) with the wave number k and the distance d
-    (Habets and Gannot, "Generating sensor signals in isotropic noise fields", JASA 122, 2007):
-    low tones are the same at both points, high tones are independent. Two stretches of the
-    recording serve as the independent signals, see `independent_shift`. A steady tone is the
-    same in all stretches: it has equal levels at the two points, but is coherent.
+    The spectrum of each point, smoothed with a standard deviation of 10 Hz, is that of the
+    recording. The coherence of the two is that of the field, sin(k d) / (k d) with the wave
+    number k and the distance d (Habets and Gannot, "Generating sensor signals in isotropic noise
+    fields", JASA 122, 2007): low tones are the same at both points, high tones are independent.
+    Two stretches of the recording serve as the independent signals, see `independent_shift`. A
+    steady tone is the same in all stretches: it has equal levels at the two points, but is
+    coherent, with a phase difference that is the same in the whole recording.
 
     Parameters
     ----------
@@ -49,16 +52,17 @@ def diffuse_noise(
     first, second = np.fft.rfft(np.stack((wave, other)))
     # sin(k d) / (k d), with k = 2 pi f / c; numpy's sinc(x) is sin(pi x) / (pi x)
     coherence = np.sinc(2 * distance / SPEED_OF_SOUND * np.fft.rfftfreq(len(wave), 1 / rate))
-    # symmetric in the two ears: each is shared and own part in equal shares
+    # each ear gets the shared and its own part in equal shares
     same, own = np.sqrt((1 + coherence) / 2), np.sqrt((1 - coherence) / 2)
     spectra = np.stack((same * first + own * second, same * first - own * second))
     # a steady tone is louder in the sum than in the difference, or softer
     width = _SMOOTHING * len(wave) / rate
     wanted, found = (gaussian_filter1d(np.abs(x) ** 2, width) for x in (first, spectra))
-    spectra *= np.sqrt(wanted / np.maximum(found, np.finfo(float).tiny))
+    # a tone of which nothing is left stays away, as it would be rounding noise
+    spectra *= np.sqrt(wanted / np.maximum(found, 1e-12 * wanted + np.finfo(float).tiny))
     both = np.fft.irfft(spectra, len(wave))
     level = np.sqrt(np.mean(both**2, axis=1, keepdims=True))
-    return (both / level).astype(np.float32)
+    return (both / np.maximum(level, np.finfo(float).tiny)).astype(np.float32)
 
 
 def independent_shift(wave: NDArray[np.float64], rate: int) -> int:
@@ -85,11 +89,11 @@ def independent_shift(wave: NDArray[np.float64], rate: int) -> int:
     power = np.abs(np.fft.rfft(wave)) ** 2
     frequency = np.fft.rfftfreq(count, 1 / rate)
     likeness = np.zeros(count)
-    for octave in range(int(np.log2(rate / 2 / _LOWEST))):
+    for octave in range(math.ceil(math.log2(rate / 2 / _LOWEST))):
         low = _LOWEST * 2**octave
         band = np.where((frequency >= low) & (frequency < 2 * low), power, 0.0)
         if total := band.sum():
-            # positive frequencies alone: the magnitude is free of the oscillation of the band
+            # positive frequencies alone: the magnitude is the envelope of the autocorrelation
             correlation = np.fft.ifft(band, count) * (count / total)
             likeness += np.abs(correlation) ** 2 + correlation.real**2
     quarter = count // 4
