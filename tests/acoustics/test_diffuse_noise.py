@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.signal import csd, welch
+from scipy.signal import csd, hilbert, welch
 
 from avn.acoustics.diffuse_noise import EARS, diffuse_noise, independent_shift
 from avn.acoustics.dry_sounds import load_sounds
@@ -76,24 +76,22 @@ def test_a_tone_that_cancels_stays_finite(count):
     assert np.isfinite(diffuse_noise(wave, 2000, 0.1715)).all()
 
 
-def test_the_shift_is_that_at_which_all_octaves_differ(white):
-    # the low half repeats after 3/8, the high half after 5/16 of the length
-    count = 16 * 4000
-    low, high = (np.fft.rfft(white[k * count : (k + 1) * count]) for k in range(2))
-    half = len(low) // 16
-    low[half:], high[:half] = 0, 0
-    wave = sum(
-        np.fft.irfft(own, count) + np.roll(np.fft.irfft(own, count), shift)
-        for own, shift in ((low, count * 3 // 8), (high, count * 5 // 16))
-    )
-    found = independent_shift(wave, RATE)
-    assert count // 4 <= found <= count // 2
-    for octave in range(7):
-        band = np.fft.rfft(wave)
-        frequency = np.fft.rfftfreq(count, 1 / RATE)
-        band[(frequency < 62.5 * 2**octave) | (frequency >= 125 * 2**octave)] = 0
-        part = np.fft.irfft(band, count)
-        assert abs(np.corrcoef(part, np.roll(part, found))[0, 1]) < 0.1
+def test_the_shift_of_a_tone_is_a_quarter_of_its_period_off():
+    # its sum and its difference with itself are as loud
+    tone = np.sin(2 * np.pi * 440 * np.arange(2 * RATE) / RATE)
+    found = independent_shift(tone, RATE)
+    assert RATE // 2 <= found <= RATE
+    assert abs(np.corrcoef(tone, np.roll(tone, found))[0, 1]) < 0.05
+
+
+def test_the_shift_of_a_narrow_band_has_the_least_coherence(white):
+    band = np.fft.rfft(white[: 2 * RATE])
+    frequency = np.fft.rfftfreq(2 * RATE, 1 / RATE)
+    band[np.abs(frequency - 1400) > 2] = 0
+    wave = np.tile(np.fft.irfft(band, 2 * RATE), 2)
+    one, other = hilbert(wave), hilbert(np.roll(wave, independent_shift(wave, RATE)))
+    coherence = np.abs(np.vdot(one, other)) / np.linalg.norm(one) / np.linalg.norm(other)
+    assert coherence < 0.1
 
 
 def test_a_hum_is_as_loud_at_both_ears():
