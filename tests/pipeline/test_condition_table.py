@@ -17,6 +17,10 @@ def test_rows_and_conditions_are_evaluated_and_written(command, tmp_path):
     code, out, err = command("reproduce", *arguments, f"outputs={tmp_path}")
     assert code == 0, err
     folder = Path(out[-1])
+    planned = [line for line in out if line.startswith("to make: run of ")]
+    assert len(planned) == 4
+    for row, condition in (("random_walk", "heard"), ("oracle", "noise_white_10")):
+        assert sum(f"run of '{row} {condition}' (seed 0, " in line for line in planned) == 1
     cells = pd.read_csv(folder / "cells.csv").set_index(["agent", "condition"])
     assert set(cells.index) == {
         (row, condition)

@@ -113,7 +113,7 @@ def make_runs(
     configs : sequence of DictConfig
         Config of each run, as of `avn.eval`.
     names : sequence of str
-        Name of each run's row, for the display; runs of one row follow each other.
+        Name of each run's row, for messages and the display; runs of one row follow each other.
     paper : mapping of str to collection of str
         Sounds by agent beside which the paper's results stand.
 
@@ -122,7 +122,7 @@ def make_runs(
     list of Path
         Folders of the runs.
     """
-    runs = [Evaluation(cfg) for cfg in configs]
+    runs = [Evaluation(cfg, name) for cfg, name in zip(configs, names, strict=True)]
     for run in runs:
         run.check()
     discard_if_forced(runs)

@@ -62,11 +62,23 @@ def agent_label(cfg: DictConfig) -> str:
 
 
 class Evaluation(Stage):
-    """Stage of a run: records of an agent over all episodes of a subset of the test world."""
+    """Stage of a run: records of an agent over all episodes of a subset of the test world.
+
+    Parameters
+    ----------
+    cfg : DictConfig
+        Config of `avn.eval`.
+    name : str, optional
+        Name of the run in messages; that of the agent by default.
+    """
 
     kind = "eval"
     # Raised when the code of simulator, agents or metrics changes a record.
     version = 5
+
+    def __init__(self, cfg: DictConfig, name: str | None = None) -> None:
+        super().__init__(cfg)
+        self._name = name or cfg.agent.name
 
     @property
     def apartments(self) -> Apartments:
@@ -130,7 +142,7 @@ class Evaluation(Stage):
     def title(self) -> str:
         """Title of the product, for messages."""
         cfg = self.cfg
-        return f"run of '{cfg.agent.name}' (seed {cfg.seed}, train_seed {cfg.train_seed})"
+        return f"run of '{self._name}' (seed {cfg.seed}, train_seed {cfg.train_seed})"
 
     @property
     def folder(self) -> Path:
