@@ -77,6 +77,22 @@ def test_another_recipe_or_training_world_is_refused(shipped, other):
         missing([Evaluation(composed(*ROW, "networks=published", other))])
 
 
+def test_in_other_apartments_the_split_of_the_package_is_named(shipped):
+    own = composed(*ROW, "networks=published", "train_seed=1")
+    with pytest.raises(
+        UserError, match=r"give training\.scenes=var, the split of all of them, or "
+    ):
+        missing([Evaluation(own)])
+    own.training.scenes.name = "var"
+    with pytest.raises(UserError, match="give networks=trained, or"):
+        missing([Evaluation(own)])
+
+
+def test_all_networks_of_the_package_are_trained_in_the_split_that_messages_name():
+    for run in publish_networks.RUNS:
+        assert composed(*run).training.scenes.name == published_networks.SCENES
+
+
 def test_what_changes_the_evaluation_alone_keeps_the_network(shipped):
     one, other = (network("networks=published", own) for own in ("seed=0", "microphone.gain=0.5"))
     assert one.fingerprint == other.fingerprint != network().fingerprint

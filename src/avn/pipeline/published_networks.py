@@ -23,6 +23,8 @@ FOLDER = Path(__file__).parents[1] / "assets" / "networks"
 INDEX = "index.json"
 # Values of `networks`.
 TRAINED, PUBLISHED = "trained", "published"
+# Split in whose apartments all networks of the package are trained.
+SCENES = "var"
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ def published_networks() -> dict[str, PublishedNetwork]:
     return _read(FOLDER / INDEX)
 
 
-def published_network(fingerprint: str, title: str) -> PublishedNetwork:
+def published_network(fingerprint: str, title: str, scenes: str) -> PublishedNetwork:
     """Return the network of the package that a training would make.
 
     Parameters
@@ -87,6 +89,8 @@ def published_network(fingerprint: str, title: str) -> PublishedNetwork:
         Fingerprint of the training.
     title : str
         Title of the training, for messages.
+    scenes : str
+        Name of the split of its training world, for messages.
 
     Raises
     ------
@@ -95,8 +99,11 @@ def published_network(fingerprint: str, title: str) -> PublishedNetwork:
     """
     known = published_networks()
     if fingerprint not in known:
+        other = (
+            "" if scenes == SCENES else f"training.scenes={SCENES}, the split of all of them, or "
+        )
         raise UserError(
-            f"networks=published: the package has no {title} of these settings; give "
+            f"networks=published: the package has no {title} of these settings; give {other}"
             f"networks=trained, or the settings of a network of {FOLDER}"
         )
     return known[fingerprint]

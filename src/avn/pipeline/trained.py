@@ -80,7 +80,8 @@ class Trained(Stage):
         check_networks(networks)
         if networks != PUBLISHED:
             return None
-        return published_network(self._training.fingerprint, self.title)
+        scenes = self.cfg.training.scenes.name
+        return published_network(self._training.fingerprint, self.title, scenes)
 
     @cached_property
     def _training(self) -> Trained:
