@@ -74,6 +74,7 @@ def test_few_apartments_have_a_reason_instead_of_an_interval(outputs, capsys):
     [
         ([], "required: RUN"),
         (["aaaaaaa0"], "RUN: aaaaaaa0 alone; give two runs or more"),
+        (["aaaaaaa0", "outputs=here"], "outputs=here: no run; give --outputs here"),
         (["aaaaaaa0", "nothing"], "nothing: neither a folder nor a run of"),
         (["aaaaaaa0", "bbbbbbb1"], "seeds differ: 0 of aaaaaaa0 and 1 of bbbbbbb1"),
         (["aaaaaaa0", "aaaaaaa0,"], "RUN: empty"),

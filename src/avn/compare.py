@@ -42,6 +42,9 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--csv", type=Path, metavar="FILE", help="write the differences as CSV too")
     options = parser.parse_args(arguments)
+    for text in options.runs:
+        if text.startswith("outputs="):
+            raise UserError(f"{text}: no run; give --outputs {text.removeprefix('outputs=')}")
     if len(options.runs) < 2:
         raise UserError(f"RUN: {options.runs[0]} alone; give two runs or more")
     return options

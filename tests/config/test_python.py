@@ -16,7 +16,7 @@ def test_the_program_s_own_hydra_stays(tmp_path):
             cfg, given = compose_command("eval", ["agent=greedy", "split=mini"])
             assert (cfg.split.name, given) == ("mini", ["agent=greedy", "split=mini"])
             assert compose("mine").key == 1
-            with pytest.raises(UserError, match="agent/greddy"):
+            with pytest.raises(UserError, match="agent: there is no 'greddy'; there are "):
                 compose_command("eval", ["agent=greddy"])
             assert compose("mine").key == 1
     assert not GlobalHydra.instance().is_initialized()

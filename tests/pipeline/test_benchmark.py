@@ -104,6 +104,9 @@ def test_the_world_is_named_with_what_was_changed(tmp_path):
         "agent=random_walk", "protocol.max_moves_ratio=3"
     )
     assert "microphone with gain=0.5" in world("agent=greedy", "microphone.gain=0.5")
+    noisy = world("agent=greedy", "microphone=white", "microphone.snr=[3,3]")
+    assert "microphone with class=DiffuseNoiseMicrophone, " in noisy
+    assert "snr=[3.0, 3.0]" in noisy
     assert world("agent=greedy", "subset=validation").endswith("validation apartments of var")
     other = world(
         "agent=greedy", "acoustics=diffraction", "+acoustics@training.acoustics=resonance"

@@ -77,6 +77,13 @@ def test_another_recipe_or_training_world_is_refused(shipped, other):
         missing([Evaluation(composed(*ROW, "networks=published", other))])
 
 
+def test_the_seeds_of_training_that_the_package_has_are_named(shipped):
+    with pytest.raises(UserError, match=r"of these settings, but with train_seed 0; give"):
+        missing([Evaluation(composed(*ROW, "networks=published", "train_seed=1"))])
+    with pytest.raises(UserError, match=r"of these settings; give"):
+        missing([Evaluation(composed(*ROW, "networks=published", "training.microphone.gain=0.5"))])
+
+
 def test_in_other_apartments_the_split_of_the_package_is_named(shipped):
     own = composed(*ROW, "networks=published", "train_seed=1")
     with pytest.raises(

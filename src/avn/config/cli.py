@@ -16,22 +16,20 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import hydra
-import yaml
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import ConfigCompositionException, HydraException, OverrideParseException
+from hydra.errors import ConfigCompositionException
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 
 from avn.config import renamed, spare
-from avn.config.audio_source import choices, name_files, quoted
+from avn.config.audio_source import name_files, quoted
+from avn.config.explain import explain
 from avn.config.folder import conf_folder, without_folders
 from avn.config.help import help_text, is_asked
 from avn.config.one_composition import composed_once
 from avn.config.option_files import option_names
 from avn.core import numerics
 from avn.core.errors import UserError
-from avn.core.files import write_failure
 from avn.core.signals import exit_code_of
 
 # Groups of the training world, from their key to Hydra's spelling. Apartments and acoustics are
@@ -47,7 +45,6 @@ _FLAGS = re.compile(
     r"-[cprih]+|--(cfg|package|resolve|run|info|hydra-help|version|shell-completion|config-path"
     r"|config-name|experimental-rerun)(=.*)?|-c[pn]"
 )
-_UNKNOWN_SOUND = re.compile(r"Could not (?:find|load) 'sound/(.*?)'")
 # Groups of which several options can be chosen at once.
 SEVERAL = ("logger", "callbacks")
 LIST_KEYS = (
@@ -55,7 +52,6 @@ LIST_KEYS = (
     *SEVERAL,
 )
 _SWEEP = ("-m", "--multirun")
-USER_MISTAKES = (UserError, HydraException, OmegaConfBaseException, yaml.YAMLError)
 
 
 def command(config_name: str) -> Callable[[Callable[[DictConfig], Path | None]], Callable[[], int]]:
@@ -187,7 +183,12 @@ def arrange(arguments: Iterable[str]) -> list[str]:
             )
         renamed.check_name(key.lstrip("+~"))
         if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
-            raise UserError(f"{argument}: name an option, such as 'none'; there are {groups[key]}")
+            raise UserError(f"{argument}: name an option; there are {groups[key]}")
+        if key in groups and key not in SEVERAL and key != "sound" and value.startswith("["):
+            raise UserError(
+                f"{argument}: a list; name one option, to which settings of other groups can be "
+                "added, such as condition=silence odometry=noisy"
+            )
         if key in SEVERAL and equals:
             _check_options(argument, key, value)
         if argument in _SWEEP:
@@ -260,55 +261,3 @@ def check_keys(cfg: DictConfig, path: str = "") -> None:
         node = None if OmegaConf.is_missing(cfg, key) else cfg[key]
         if isinstance(node, DictConfig):
             check_keys(node, f"{path}{key}.")
-
-
-def explain(error: BaseException, composed: bool = True) -> str | None:
-    """Return a one-line message for a mistake of the user, None for an internal error.
-
-    Errors before the job starts come from the command line or a config file, so every exception
-    there counts as a mistake of the user.
-    """
-    chain = [error]
-    while (cause := chain[-1].__cause__ or chain[-1].__context__) and cause not in chain:
-        chain.append(cause)
-    for link in chain:
-        if isinstance(link, UserError):
-            return _one_line(str(link))
-        if isinstance(link, OverrideParseException):
-            return f"{link.override}: cannot be read; put quotes round what Hydra reads as grammar"
-    for link in chain:
-        if isinstance(link, OSError) and link.filename and not isinstance(link, HydraException):
-            # what is not there was to be made
-            made = None if os.path.lexists(link.filename) else write_failure(link, "")
-            return _one_line(made or f"{link.filename}: {link.strerror}")
-    if line := write_failure(error, "outputs"):
-        return _one_line(line)
-    if not composed or isinstance(error, USER_MISTAKES):
-        lines = (_one_line(str(link)) for link in chain if str(link))
-        # OmegaConf leaves the name of a key out of some of its messages
-        first, *causes = dict.fromkeys(line for line in lines if "$FULL_KEY" not in line)
-        known = [_known(link) for link in chain if _known(link)][:1]
-        if "Could not find 'split/" in first:
-            known.append("for a folder of floor plans give split.folder=PATH split.name=NAME")
-        if unknown := _UNKNOWN_SOUND.search(first):
-            known.append(f"there are {', '.join(option_names('sound'))}, {choices(unknown[1])}")
-            first, causes = f"sound: there is no '{unknown[1]}'", []
-        return "; ".join([first, *(cause for cause in causes[:1] if cause not in first), *known])
-    return None
-
-
-def _known(error: BaseException) -> str:
-    """Return the keys of a node as text if an error is about an unknown key."""
-    schema = getattr(error, "object_type", None)
-    if " not in '" not in str(error) or not dataclasses.is_dataclass(schema):
-        return ""
-    names = [field.name for field in dataclasses.fields(schema) if field.name != "_target_"]
-    return f"there are {', '.join(names)}"
-
-
-def _one_line(text: str) -> str:
-    text = text.split("Config search path:")[0]
-    text = re.sub(r"To append to your config use \S+", "", text)  # which is refused too
-    text = re.sub(r"\s+\w*schema\b", "", text)  # the dataclasses stand among the options
-    text = re.sub(r"\s*(full_key|object_type|reference_type)[:=]\s*\S*", "", text)
-    return " ".join(text.split())

@@ -15,7 +15,7 @@ from avn.config.python import composing
 _GROUPS = ("split", "acoustics", "protocol", "schedule", "distractor", "odometry", "motion")
 
 
-def default_config(cfg: DictConfig) -> DictConfig:
+def default_config(cfg: DictConfig, condition: str = "none") -> DictConfig:
     """Return the config of a run's row in its world, as the package defines the two.
 
     The world is the options of split, acoustics and protocol, and of what changes in an episode.
@@ -26,8 +26,11 @@ def default_config(cfg: DictConfig) -> DictConfig:
     ----------
     cfg : DictConfig
         Config of `avn.eval`.
+    condition : str
+        Option of the group `condition` with which it was composed, part of its world.
     """
     named = [(group, str(OmegaConf.select(cfg, f"{group}.name"))) for group in ("agent", *_GROUPS)]
+    named.append(("condition", condition))
     return _composed(
         tuple(
             f"{group}={name}"

@@ -45,7 +45,10 @@ class Distractor:
             If the apartment has one source, or all sounds have one category.
         """
         if sources < 2:
-            raise UserError("distractor: an apartment has one source and no place for a second")
+            raise UserError(
+                "distractor: an apartment has one source and no place for a second; give its floor "
+                "plan two sources or more, or distractor=none"
+            )
         if len({self.categories[name] for name in sounds}) < 2:
             raise UserError(
                 "distractor: all sounds are of one category; give sounds of several, such as "

@@ -121,16 +121,16 @@ def describe_world(cfg: DictConfig, default: DictConfig) -> str:
     changed = changed_settings(cfg, default)
     training = OmegaConf.select(cfg, TRAINING.acoustics)
     reads_training = any(key.startswith(f"{TRAINING.acoustics}.") for key in Evaluation(cfg).read())
-    acoustics = _named(cfg, "acoustics", changed)
+    acoustics = named(cfg, "acoustics", changed)
     own, other = ((node.name, node.head) for node in (training, cfg.acoustics))
     if reads_training and own != other:
         head = f" with head={training.head}" if training.head != cfg.acoustics.head else ""
         acoustics += f" (networks trained in {training.name}{head})"
-    parts = [acoustics, _named(cfg, "protocol", changed), sounds_text(*_sounds(cfg))]
-    parts += [_named(cfg, group, changed) for group in changing(cfg)]
+    parts = [acoustics, named(cfg, "protocol", changed), sounds_text(*_sounds(cfg))]
+    parts += [named(cfg, group, changed) for group in changing(cfg)]
     if microphone := _changes("microphone", changed):
         parts.append(f"microphone with {microphone}")
-    split = _named(cfg, "split", changed)
+    split = named(cfg, "split", changed)
     scenes = OmegaConf.select(cfg, f"{TRAINING.split}.name")
     if reads_training and scenes != cfg.split.name:
         split += f" (networks trained in {scenes})"
@@ -178,8 +178,18 @@ def _text(value: object) -> str:
     return joined_names([*map(str, value)]) if isinstance(value, dict) else str(value)
 
 
-def _named(cfg: DictConfig, group: str, changed: Mapping[str, str]) -> str:
-    """Return a group and its option, such as `protocol var with max_moves_ratio=3.0`."""
+def named(cfg: DictConfig, group: str, changed: Mapping[str, str]) -> str:
+    """Return a group and its option, such as `protocol var with max_moves_ratio=3.0`.
+
+    Parameters
+    ----------
+    cfg : DictConfig
+        Config of `avn.eval`.
+    group : str
+        Group of the config whose option has a name.
+    changed : mapping of str to str
+        Result of `changed_settings`.
+    """
     name = OmegaConf.select(cfg, f"{group}.name")
     text = str(name) if group == "split" else f"{group} {name}"
     return f"{text} with {changes}" if (changes := _changes(group, changed)) else text
@@ -188,6 +198,8 @@ def _named(cfg: DictConfig, group: str, changed: Mapping[str, str]) -> str:
 def _changes(group: str, changed: Mapping[str, str]) -> str:
     prefix = f"{group}."
     own = {k: v for k, v in changed.items() if k.startswith(prefix) and k != f"{prefix}name"}
+    if target := own.pop(f"{prefix}_target_", None):
+        own = {f"{prefix}class": target.rpartition(".")[2], **own}
     return ", ".join(f"{key.removeprefix(prefix)}={value}" for key, value in own.items())
 
 

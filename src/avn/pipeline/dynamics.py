@@ -9,6 +9,7 @@ from omegaconf import DictConfig
 
 from avn.apartments.floor_plan import FloorPlan
 from avn.core.classes import build_object
+from avn.core.errors import UserError
 from avn.navigation.dynamics import Dynamics
 from avn.pipeline.sounds import sound_categories, sound_files
 
@@ -37,4 +38,7 @@ def check_dynamics(cfg: DictConfig, plans: Sequence[FloorPlan]) -> None:
     """Refuse settings with which an episode in one of the apartments could not be drawn."""
     if distractor := build_dynamics(cfg).distractor:
         for plan in plans:
-            distractor.check(len(plan.sources), list(sound_files(cfg)))
+            try:
+                distractor.check(len(plan.sources), list(sound_files(cfg)))
+            except UserError as error:
+                raise UserError(f"{error} (apartment '{plan.name}')") from None

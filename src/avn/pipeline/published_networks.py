@@ -8,6 +8,7 @@ figures of a published network are measured with these.
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -99,14 +100,24 @@ def published_network(fingerprint: str, title: str, scenes: str) -> PublishedNet
     """
     known = published_networks()
     if fingerprint not in known:
-        other = (
-            "" if scenes == SCENES else f"training.scenes={SCENES}, the split of all of them, or "
-        )
+        other = f"training.scenes={SCENES}, the split of all of them, or "
         raise UserError(
-            f"networks=published: the package has no {title} of these settings; give {other}"
-            f"networks=trained, or the settings of a network of {FOLDER}"
+            f"networks=published: the package has no {title} of these settings{_seeds(title)}; "
+            f"give {other if scenes != SCENES else ''}networks=trained, or the settings of a "
+            f"network of {FOLDER}"
         )
     return known[fingerprint]
+
+
+def _seeds(title: str) -> str:
+    """Return the seeds of training with which the package has a network, if not with this one."""
+    titles = [own.title for own in published_networks().values()]
+    seed = re.compile(r"train_seed (\d+)")
+    same = [own for own in titles if seed.sub("", own) == seed.sub("", title)]
+    seeds = sorted({number for own in same for number in seed.findall(own)}, key=int)
+    if not seeds or title in same:
+        return ""
+    return f", but with train_seed {', '.join(seeds)}"
 
 
 def check_networks(value: str) -> None:

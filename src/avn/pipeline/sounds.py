@@ -25,9 +25,11 @@ def sound_files(cfg: DictConfig, world: WorldKeys = TEST) -> dict[str, str]:
     Raises
     ------
     UserError
-        For an invalid or reserved name, and for files that would have one name.
+        For an empty list, an invalid or reserved name, and for files that would have one name.
     """
-    given = {str(name): str(path) for name, path in plain(cfg, world.sounds).items()}
+    given = {str(name): str(path) for name, path in (plain(cfg, world.sounds) or {}).items()}
+    if not given:
+        raise UserError(f"{world.sounds}: empty; give a recording, such as {world.sounds}=ring")
     sounds = name_sounds(given)
     for name in sounds:
         check_name(world.sounds, name)

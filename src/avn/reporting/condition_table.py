@@ -114,10 +114,10 @@ def _others(
 
 
 def _text(cells: pd.DataFrame, agent: str, condition: str) -> tuple[str, str]:
-    """Return success rate and SPL of a cell, and their intervals, empty where there are none."""
+    """Return success rate and SPL of a cell, "-" without one, and their intervals, if any."""
     own = cells[(cells["agent"] == agent) & (cells[CONDITION] == condition)]
     if not len(own):
-        return "", ""
+        return "-", ""
     row = own.iloc[0]
     main = f"{row['sr']:.1f} / {row['spl']:.1f}"
     if pd.isna(row["sr_low"]):
