@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 import yaml
+from omegaconf import OmegaConf
+from small import composed
 
 from avn import ls
 
@@ -52,6 +54,35 @@ def test_each_finished_run_has_its_world_and_figures(runs, capsys):
     assert first["acoustics"] == "diffraction"
     assert Path(first["folder"]).is_dir()
     assert rows[2]["success"] == 0.125
+
+
+@pytest.mark.parametrize(
+    ("condition", "said"),
+    [
+        ("unheard", ""),
+        ("gain_minus_6", "gain=0.501"),
+        ("noise_white_10", "noise=white snr=10"),
+        ("noise_household_0", "noise=6-recordings snr=0"),
+        ("other_head", "head=kemar"),
+        ("distractor_told", "distractor=other_category told"),
+        ("silence", "schedule=intermittent"),
+        ("odometry_noise", "odometry=noisy"),
+        ("moving", "motion=walking"),
+    ],
+)
+def test_a_run_says_in_which_condition_it_was(runs, capsys, condition, said):
+    cfg = composed("agent=belief", "acoustics=diffraction", f"condition={condition}")
+    (file,) = runs.glob("eval/greedy/*/seed0-00000000/config.yaml")
+    file.write_text(OmegaConf.to_yaml(cfg, resolve=True))
+    (row,) = listed(capsys, f"outputs={runs}", "format=json", "agent=belief")
+    assert row["condition"] == said
+
+
+def test_a_damaged_microphone_is_no_traceback(runs, capsys):
+    (file,) = runs.glob("eval/greedy/*/seed0-00000000/config.yaml")
+    file.write_text("agent: {name: greedy}\nmicrophone: {noises: [white], snr: 3, gain: loud}\n")
+    (row,) = listed(capsys, f"outputs={runs}", "format=json", "agent=greedy")
+    assert row["condition"] is None
 
 
 def test_runs_are_filtered_and_sorted_by_column(runs, capsys):

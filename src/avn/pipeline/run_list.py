@@ -20,7 +20,7 @@ from avn.core.errors import UserError
 
 # Columns, in order. `sort` and filters take them by these names.
 COLUMNS = (
-    *("agent", "sound", "protocol", "acoustics", "split", "subset", "episodes"),
+    *("agent", "sound", "protocol", "acoustics", "split", "subset", "episodes", "condition"),
     *("seed", "train_seed", "success", "spl", "date", "folder"),
 )
 NUMBERS = ("seed", "train_seed", "success", "spl")
@@ -128,8 +128,41 @@ def _row(folder: Path) -> Row:
     row |= {key: cfg.get(key) for key in ("subset", "episodes", "seed", "train_seed")}
     sounds = cfg.get("sound")
     row["sound"] = joined_names([*map(str, sounds)]) if isinstance(sounds, dict) else None
+    try:
+        row["condition"] = _condition(cfg)
+    except (AttributeError, TypeError, ValueError):  # damaged
+        row["condition"] = None
     changed = datetime.fromtimestamp((folder / _RESULTS).stat().st_mtime, UTC)
     return row | {"date": changed.strftime("%Y-%m-%d %H:%M"), "folder": str(folder)}
+
+
+def _condition(cfg: Mapping[str, Any]) -> str:
+    """Return what is added to a still source in the quiet, such as `noise=white snr=10`."""
+    nodes = {key: own for key, own in cfg.items() if isinstance(own, dict)}
+    found = [
+        f"{group}={nodes[group].get('name')}"
+        for group in ("schedule", "distractor", "odometry", "motion")
+        if nodes.get(group, {}).get("_target_")
+    ]
+    if nodes.get("distractor", {}).get("told"):
+        found.append("told")
+    heads = [own.get("head") for own in _acoustics(nodes)]
+    if len(set(heads)) > 1:
+        found.append(f"head={heads[0]}")
+    microphone = nodes.get("microphone", {})
+    if noises := microphone.get("noises"):
+        ends = dict.fromkeys(f"{own:g}" for own in microphone.get("snr", ()))
+        named = noises[0] if len(noises) == 1 else f"{len(noises)}-recordings"
+        found.append(f"noise={named} snr={' to '.join(ends)}")
+    if microphone.get("gain", 1) != 1:
+        found.append(f"gain={microphone['gain']:.3g}")
+    return " ".join(found)
+
+
+def _acoustics(nodes: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the settings of the acoustics of the test world and of the training world."""
+    found = (nodes.get("acoustics"), nodes.get("training", {}).get("acoustics"))
+    return [own for own in found if isinstance(own, dict)]
 
 
 def _name(cfg: Mapping[str, Any], group: str) -> str | None:
