@@ -55,6 +55,21 @@ def test_dots_are_on_their_squares_with_the_area_of_the_probability() -> None:
     assert "where the source may be" in figure.legends[0].get_texts()[-1].get_text()
 
 
+@pytest.mark.parametrize("words", [3, 60])
+def test_caption_legend_and_panels_do_not_overlap(words) -> None:
+    trace = max(walked(hearing()), key=lambda own: len(own.action))
+    figure = belief_figure(trace, "belief", " ".join(["acoustics"] * words))
+    figure.canvas.draw()
+    legend = figure.legends[0].get_window_extent()
+    (caption,) = (text for text in figure.texts if text.get_text().endswith("acoustics"))
+    lines = caption.get_text().split("\n")
+    box = caption.get_window_extent()
+    # the first lines are empty, and leave room for the legend
+    shown = box.y0 + box.height * sum(map(bool, lines)) / len(lines)
+    assert legend.y0 >= shown - 1
+    assert all(axes.get_tightbbox().y0 >= legend.y1 for axes in figure.axes if axes.images)
+
+
 def test_agents_without_maps_have_no_such_pictures() -> None:
     trace = walked(Greedy(), [0])[0]
     with pytest.raises(ValueError, match="no map"):

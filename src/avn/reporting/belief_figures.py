@@ -16,6 +16,7 @@ from avn.core.actions import HEADINGS
 from avn.navigation.trace import BeliefTrace, Trace
 from avn.reporting.sound_figures import draw_plan
 from avn.reporting.trajectory_figures import (
+    CAPTION,
     FRONT,
     RUN_COLOURS,
     draw_place,
@@ -71,14 +72,29 @@ def belief_figure(trace: Trace, name: str, caption: str = "") -> Figure:
     bar = figure.colorbar(image, ax=list(panels), fraction=0.025, pad=0.01)
     bar.set_label("belief that a square is free")
     figure.suptitle(wrapped(f"{name}: {title_of(trace)}; {outcome(trace)}", 110), fontsize=10)
-    figure.legend(
-        handles=_belief_handles(trace.source_estimates is not None, beliefs.posterior is not None),
-        loc="outside lower left",
-        ncols=4,
-        frameon=False,
-        fontsize=9,
+    _legend(
+        figure,
+        _belief_handles(trace.source_estimates is not None, beliefs.posterior is not None),
     )
     return figure
+
+
+def _legend(figure: Figure, handles: list[Line2D]) -> None:
+    """Draw a legend of one line at the bottom of a figure, above its caption."""
+    style: dict[str, Any] = {"handles": handles, "ncols": len(handles), "frameon": False}
+    style |= {"fontsize": 9, "borderaxespad": 0.0}
+    caption = figure.get_supxlabel()
+    if not caption:
+        figure.legend(loc="outside lower left", **style)
+        return
+    # the layout keeps the caption clear of the panels, and not of a legend outside of them
+    room = "\n\n"
+    label = figure.supxlabel(f"{room}{caption}", x=0.01, ha="left", **CAPTION)
+    figure.canvas.draw()
+    lines = caption.count("\n") + 1
+    box = label.get_window_extent().transformed(figure.transFigure.inverted())
+    top = box.y0 + box.height * lines / (lines + room.count("\n"))
+    figure.legend(loc="lower left", bbox_to_anchor=(0.0, top), **style).set_in_layout(False)
 
 
 def _belief_handles(estimate: bool, posterior: bool) -> list[Line2D]:

@@ -27,6 +27,8 @@ _SOURCE: dict[str, Any] = {"color": "#ffb000", "mec": "black", "mew": 0.8, "mark
 # Style of the distractor's diamond.
 DISTRACTOR: dict[str, Any] = {"color": "0.6", "mec": "black", "mew": 0.8, "markersize": 10}
 FRONT = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)])
+# Text of captions.
+CAPTION: dict[str, Any] = {"fontsize": 8, "color": "0.35"}
 
 
 def plan_of(trace: Trace) -> FloorPlan | None:
@@ -263,7 +265,7 @@ def figure_of(width: float, height: float, caption: str = "") -> Figure:
     if caption:
         wide = int(15 * width)  # letters of this size in the width
         lines = [part for line in caption.splitlines() for part in textwrap.wrap(line, wide)]
-        figure.supxlabel("\n".join(lines), x=0.01, ha="left", fontsize=8, color="0.35")
+        figure.supxlabel("\n".join(lines), x=0.01, ha="left", **CAPTION)
     return figure
 
 
