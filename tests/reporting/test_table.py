@@ -53,6 +53,16 @@ def test_table_has_a_row_for_each_sound_and_a_column_for_each_room() -> None:
     assert cells(lines, "all") == [["100/50.0"] * 3]
 
 
+def test_metrics_of_episodes_that_change_follow_over_all_sounds() -> None:
+    table = results("belief").assign(sws=0.25, drift=1.5, dsr=float("nan"))
+    table.loc[table["sound"] == "ring", "sws"] = 0.75
+    lines = printed(table)
+    assert cells(lines, "SWS, %") == [["25.0"] * 3]
+    assert cells(lines, "drift, m") == [["1.5"] * 3]
+    assert not cells(lines, "DSR, %"), "no episode has a distractor"
+    assert not cells(printed(results("belief")), "SWS, %")
+
+
 def test_the_papers_own_figures_stand_below_ours() -> None:
     lines = printed(results("greedy"), paper={"greedy": WHOLE})
     assert cells(lines, "Gan et al. 2020") == [

@@ -8,19 +8,11 @@ import pandas as pd
 from rich.table import Table
 from rich.text import Text
 
-from avn.reporting.results import ALL_SOUNDS, AVERAGE, across_runs, metrics_of
+from avn.reporting.results import ALL_SOUNDS, AVERAGE, DYNAMIC_HEADINGS, across_runs, metrics_of
 
 CONDITION = "condition"
 _ENDS = ("", "_low", "_high", "_network_std")
 _PERCENT = tuple(f"{metric}{end}" for metric in ("sr", "spl") for end in _ENDS)
-# Heading and factor of the metrics of conditions in which something changes in an episode.
-_DYNAMIC = {
-    "sws": ("SWS, %", 100.0),
-    "dsr": ("DSR, %", 100.0),
-    "drift": ("drift, m", 1.0),
-    "dspl": ("DSPL, %", 100.0),
-    "ndtg": ("NDTG, %", 100.0),
-}
 
 
 def condition_cells(episodes: pd.DataFrame) -> pd.DataFrame:
@@ -51,10 +43,13 @@ def condition_cells(episodes: pd.DataFrame) -> pd.DataFrame:
     cells["episodes"] //= cells["networks"]
     cells[list(_PERCENT)] *= 100.0
     dynamic = [
-        f"{metric}{end}" for metric in metrics_of(episodes) if metric in _DYNAMIC for end in _ENDS
+        f"{metric}{end}"
+        for metric in metrics_of(episodes)
+        if metric in DYNAMIC_HEADINGS
+        for end in _ENDS
     ]
     for column in dynamic:
-        cells[column] *= _DYNAMIC[column.split("_")[0]][1]
+        cells[column] *= DYNAMIC_HEADINGS[column.split("_")[0]][1]
     labels = ["agent", CONDITION, "protocol", "acoustics", "look", "networks", "episodes"]
     return cells[[*labels, *_PERCENT, *dynamic]]
 
@@ -105,7 +100,7 @@ def _others(
     """Return the further metrics of a condition: name with unit, and the text of each agent."""
     own = cells[cells[CONDITION] == condition].set_index("agent")
     found = []
-    for metric, (heading, _) in _DYNAMIC.items():
+    for metric, (heading, _) in DYNAMIC_HEADINGS.items():
         if metric in own and own[metric].notna().any():
             values = own[metric].reindex(list(agents))
             texts = ["" if pd.isna(value) else f"{value:.1f}" for value in values]

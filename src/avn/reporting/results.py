@@ -38,6 +38,14 @@ DYNAMIC_METRICS = {
     "dspl": "dspl",
     "ndtg": "ndtg",
 }
+# Their headings in tables, and factors.
+DYNAMIC_HEADINGS = {
+    "sws": ("SWS, %", 100.0),
+    "dsr": ("DSR, %", 100.0),
+    "drift": ("drift, m", 1.0),
+    "dspl": ("DSPL, %", 100.0),
+    "ndtg": ("NDTG, %", 100.0),
+}
 ALL_SOUNDS = "all"
 AVERAGE = "average"
 NO_INTERVAL = (

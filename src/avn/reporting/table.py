@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from avn.reporting.paper import PAPER, paper_results
-from avn.reporting.results import AVERAGE, USUAL_LOOK, shown_scenes
+from avn.reporting.results import ALL_SOUNDS, AVERAGE, DYNAMIC_HEADINGS, USUAL_LOOK, shown_scenes
 
 
 def results_table(
@@ -22,7 +22,8 @@ def results_table(
 ) -> Table:
     """Tabulate success rate / SPL in %, with rows of agents and sounds and columns of scenes.
 
-    Results of several seeds are averaged.
+    Results of several seeds are averaged. Metrics of worlds that change in the course of an episode
+    follow, over all sounds.
 
     Parameters
     ----------
@@ -53,6 +54,8 @@ def results_table(
             if len(own):
                 cells = _cells(own.droplevel(["agent", "sound"]), scenes)
                 table.add_row(f"    {PAPER}", *cells, style="dim")
+        for heading, values in _dynamic(run, scenes):
+            table.add_row(f"    {heading}", *values, style="dim")
     return table
 
 
@@ -160,6 +163,18 @@ def _cells(percent: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     return [
         _cell(*row) for row in percent.reindex(list(scenes))[["sr", "spl"]].to_numpy(np.float64)
     ]
+
+
+def _dynamic(run: pd.DataFrame, scenes: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Return the heading and values of the metrics of episodes that change, over all sounds."""
+    pooled = run[run["sound"] == ALL_SOUNDS]
+    means = (pooled if len(pooled) else run).groupby("scene", sort=False).mean(numeric_only=True)
+    found = []
+    for metric, (heading, factor) in DYNAMIC_HEADINGS.items():
+        if metric in means and means[metric].notna().any():
+            values = factor * means[metric].reindex(list(scenes))
+            found.append((heading, ["" if np.isnan(own) else f"{own:.1f}" for own in values]))
+    return found
 
 
 def _cell(sr: float, spl: float) -> str:
