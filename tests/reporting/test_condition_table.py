@@ -38,12 +38,12 @@ def test_a_cell_is_the_mean_over_scenes_and_networks_of_all_sounds(episodes):
     assert row["sr_low"] < row["sr"] < row["sr_high"]
 
 
-def test_the_text_keeps_the_order_and_leaves_missing_cells_empty(episodes):
+def test_the_text_keeps_the_order_and_says_where_a_cell_is_missing(episodes):
     cells = condition_cells(episodes[episodes["agent"] != "greedy"])
     text = markdown(cells, ["unheard", "heard"], ["greedy", "belief"]).splitlines()
     assert text[0] == "| condition | `greedy` | `belief` |"
     assert [line.split("|")[1].strip() for line in text[2:]] == ["`unheard`", "`heard`"]
-    assert all(line.split("|")[2].strip() == "" for line in text[2:])
+    assert all(line.split("|")[2].strip() == "-" for line in text[2:])
 
 
 def test_a_moving_source_has_dynamic_spl_and_the_distance_that_is_left(episodes):
