@@ -164,10 +164,9 @@ class _Rows:
 
 def _averages(folder: Path) -> pd.Series:
     """Return success rate and SPL of a run over all sounds and scenes."""
-    run = results.summarise(read_episodes(folder), draws=0)
-    average = run[run["scene"] == results.AVERAGE]
-    all_sounds = average[average["sound"] == results.ALL_SOUNDS]
-    mean: pd.Series = (all_sounds if len(all_sounds) else average)[["sr", "spl"]].mean()
+    pooled = read_episodes(folder).assign(sound=results.ALL_SOUNDS)
+    run = results.summarise(pooled, draws=0)
+    mean: pd.Series = run[run["scene"] == results.AVERAGE][["sr", "spl"]].mean()
     return mean
 
 
