@@ -58,7 +58,7 @@ def _conditions(cfg: DictConfig) -> Path:
     if len(untold) == len(composed):
         raise UserError(
             f"rows: no sound network of {', '.join(dict.fromkeys(row for row, _ in untold))} can "
-            "be told the category of the goal; give rows=belief_told, or other conditions"
+            "be told the category of the goal; give rows=belief_told or distractor.told=false"
         )
     for condition in dict.fromkeys(condition for _, condition in untold):
         rows = ", ".join(row for row, own in untold if own == condition)

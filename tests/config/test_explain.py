@@ -14,14 +14,16 @@ import soundfile
         ("condition=hard", "condition: there is no 'hard'; there are distractor, "),
         (
             "condition=[heard,silence]",
-            "condition=[heard,silence]: a list; name one option, to which settings of other groups "
-            "can be added, such as condition=silence odometry=noisy",
+            "condition=[heard,silence]: a list; name one condition, to which settings can "
+            "be added, such as condition=silence odometry=noisy",
         ),
         (
             "condition=silence,unheard",
             "condition=silence,unheard: several values; add -m for a run with each",
         ),
-        ("sound=ring,clock", "add -m for a run with each or sound=[ring,clock] for all at once"),
+        ("sound=ring,clock", "several values; put brackets round a list or quotes round a text, "),
+        ("training.sounds=ring,clock", "training.sounds=ring,clock: several values; put brackets"),
+        ("microphone=white microphone.snr=3,10", "microphone.snr=3,10: several values; put brack"),
         ("sound=[]", "sound: empty; give a recording, such as sound=ring"),
         ("sound=", "sound=: name an option; there are alarm, "),
         ("microphone=white microphone.snr=3", "microphone.snr=3; give a list, such as [0, 1]"),
@@ -44,8 +46,8 @@ def test_a_mistake_is_one_line_that_names_the_option_and_what_to_do(
 @pytest.mark.parametrize(
     ("given", "printed"),
     [
-        ("condition=unheard", "condition: no group of this command; give conditions="),
-        ("agent=belief", "agent: no group of this command; give rows="),
+        ("condition=unheard", "condition: no group of this command; avn.reproduce has conditions="),
+        ("agent=belief", "agent: no group of this command; avn.reproduce has rows="),
     ],
 )
 def test_a_group_of_eval_is_no_group_of_reproduce(command, tmp_path, given, printed):

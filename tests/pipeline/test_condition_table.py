@@ -73,6 +73,20 @@ def test_the_heading_names_each_setting_that_is_not_that_of_the_row_or_the_condi
     assert "microphone.noise_rms=0" in changed
 
 
+@pytest.mark.parametrize(
+    ("condition", "given"),
+    [
+        ("heard", "odometry=noisy"),
+        ("silence", "schedule=continuous"),
+        ("unheard", "motion=walking"),
+        ("unheard", "sound=ring"),
+        ("unheard", "episodes=frozen"),
+    ],
+)
+def test_an_option_in_place_of_that_of_the_condition_is_named(condition, given):
+    assert f"with {given}" in caption("agent=belief", given, condition=condition)
+
+
 def test_settings_of_one_row_or_one_condition_are_named_too():
     world = ("acoustics=diffraction", "protocol=stop")
     cells = {

@@ -78,7 +78,7 @@ def test_another_recipe_or_training_world_is_refused(shipped, other):
 
 
 def test_the_seeds_of_training_that_the_package_has_are_named(shipped):
-    with pytest.raises(UserError, match=r"of these settings, but with train_seed 0; give"):
+    with pytest.raises(UserError, match=r"of this name it has train_seed 0; give"):
         missing([Evaluation(composed(*ROW, "networks=published", "train_seed=1"))])
     with pytest.raises(UserError, match=r"of these settings; give"):
         missing([Evaluation(composed(*ROW, "networks=published", "training.microphone.gain=0.5"))])

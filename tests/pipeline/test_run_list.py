@@ -80,9 +80,18 @@ def test_a_run_says_in_which_condition_it_was(runs, capsys, condition, said):
 
 def test_a_damaged_microphone_is_no_traceback(runs, capsys):
     (file,) = runs.glob("eval/greedy/*/seed0-00000000/config.yaml")
-    file.write_text("agent: {name: greedy}\nmicrophone: {noises: [white], snr: 3, gain: loud}\n")
+    for damaged in ("noises: [white], snr: 3, gain: loud", "noises: {white: 1}, snr: [3]"):
+        file.write_text(f"agent: {{name: greedy}}\nmicrophone: {{{damaged}}}\n")
+        (row,) = listed(capsys, f"outputs={runs}", "format=json", "agent=greedy")
+        assert row["condition"] is None
+    assert listed(capsys, f"outputs={runs}", "format=json", "sort=seed")[-1]["condition"] is None
+
+
+def test_another_level_is_said(runs, capsys):
+    (file,) = runs.glob("eval/greedy/*/seed0-00000000/config.yaml")
+    file.write_text("agent: {name: greedy}\nmicrophone: {level: [-6.0, 6.0]}\n")
     (row,) = listed(capsys, f"outputs={runs}", "format=json", "agent=greedy")
-    assert row["condition"] is None
+    assert row["condition"] == "level=-6 to 6"
 
 
 def test_runs_are_filtered_and_sorted_by_column(runs, capsys):

@@ -184,10 +184,10 @@ def arrange(arguments: Iterable[str]) -> list[str]:
         renamed.check_name(key.lstrip("+~"))
         if key in groups and equals and (value in ("", "null") or value.endswith("schema")):
             raise UserError(f"{argument}: name an option; there are {groups[key]}")
-        if key in groups and key not in SEVERAL and key != "sound" and value.startswith("["):
+        if key == "condition" and value.startswith("["):
             raise UserError(
-                f"{argument}: a list; name one option, to which settings of other groups can be "
-                "added, such as condition=silence odometry=noisy"
+                f"{argument}: a list; name one condition, to which settings can be added, "
+                "such as condition=silence odometry=noisy"
             )
         if key in SEVERAL and equals:
             _check_options(argument, key, value)

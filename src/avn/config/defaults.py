@@ -11,8 +11,9 @@ from avn.config import option_files
 from avn.config.folder import conf_folder
 from avn.config.python import composing
 
-# Groups whose options a run names besides its row.
-_GROUPS = ("split", "acoustics", "protocol", "schedule", "distractor", "odometry", "motion")
+# Groups whose options a run names, and those that are of its condition if it has one.
+_GROUPS = ("agent", "split", "acoustics", "protocol")
+_OF_CONDITIONS = ("schedule", "distractor", "odometry", "motion")
 
 
 def default_config(cfg: DictConfig, condition: str = "none") -> DictConfig:
@@ -27,9 +28,11 @@ def default_config(cfg: DictConfig, condition: str = "none") -> DictConfig:
     cfg : DictConfig
         Config of `avn.eval`.
     condition : str
-        Option of the group `condition` with which it was composed, part of its world.
+        Option of the group `condition` with which it was composed: what changes in an episode is
+        then that of the condition.
     """
-    named = [(group, str(OmegaConf.select(cfg, f"{group}.name"))) for group in ("agent", *_GROUPS)]
+    groups = _GROUPS if condition != "none" else (*_GROUPS, *_OF_CONDITIONS)
+    named = [(group, str(OmegaConf.select(cfg, f"{group}.name"))) for group in groups]
     named.append(("condition", condition))
     return _composed(
         tuple(

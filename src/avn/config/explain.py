@@ -12,6 +12,7 @@ from hydra.errors import HydraException, OverrideParseException
 from omegaconf.errors import OmegaConfBaseException
 
 from avn.config.audio_source import AUDIO_SUFFIXES, choices
+from avn.config.folder import conf_folder
 from avn.config.option_files import option_names
 from avn.core.errors import UserError
 from avn.core.files import write_failure
@@ -66,13 +67,18 @@ def explain(error: BaseException, composed: bool = True) -> str | None:
 def _named(line: str) -> str:
     """Return a message of Hydra about a group in words that name the group and its options."""
     if found := _AMBIGUOUS.search(line):
-        argument = found[1]
-        both = f" or {argument.replace('=', '=[', 1)}] for all at once" * ("sound" in argument)
-        return f"{argument}: several values; add -m for a run with each{both}"
+        argument = found[1].replace("sound@training.sounds", "training.sounds")
+        key = argument.partition("=")[0]
+        if key != "sound" and (conf_folder() / key).is_dir():
+            return f"{argument}: several values; add -m for a run with each"
+        return (
+            f"{argument}: several values; put brackets round a list or quotes round a text, or add "
+            "-m for a run with each"
+        )
     if (found := _UNKNOWN_OPTION.search(line)) and found[1] not in ("split", "sound"):
         return f"{found[1]}: there is no '{found[2]}'; there are {', '.join(found[3].split())}"
     if found := _NO_GROUP.search(line):
-        instead = f"; give {_LISTS[found[1]]}=" if found[1] in _LISTS else ""
+        instead = f"; avn.reproduce has {_LISTS[found[1]]}=" if found[1] in _LISTS else ""
         return f"{found[1]}: no group of this command{instead}"
     return _NO_LIST.sub("give a list, such as [0, 1]", line)
 

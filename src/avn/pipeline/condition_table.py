@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 from omegaconf import DictConfig
 
+from avn.acoustics.sound_names import joined_names
 from avn.core.files import atomic_write, stage_folder
 from avn.core.hashing import digest
 from avn.navigation.episodes import ONE_SOUND
@@ -18,8 +19,10 @@ from avn.pipeline.benchmark import (
     named,
     note_of,
 )
+from avn.pipeline.dynamics import GROUPS
 from avn.pipeline.reproduction import make_runs, runs_of, with_networks
 from avn.pipeline.run import Evaluation, agent_label
+from avn.pipeline.sounds import sound_files
 from avn.reporting import condition_table, results, table
 from avn.reporting.condition_table import CONDITION
 from avn.reporting.finished_run import read_episodes
@@ -100,7 +103,15 @@ def changed_in(
     of_conditions = {condition: (row, condition) for row, condition in by_settings}
     changed: dict[str, str] = {}
     for pair in dict.fromkeys([*of_rows.values(), *of_conditions.values()]):
-        changed |= changed_settings(composed[pair], default_of(composed[pair], pair[1]))
+        cfg, default = composed[pair], default_of(composed[pair], pair[1])
+        own = changed_settings(cfg, default)
+        for group in GROUPS:
+            if cfg[group].name != default[group].name:
+                own = {key: value for key, value in own.items() if key.split(".")[0] != group}
+                own[group] = str(cfg[group].name)
+        if sound_files(cfg) != sound_files(default):
+            own["sound"] = joined_names(list(sound_files(cfg)))
+        changed |= own
     return changed
 
 

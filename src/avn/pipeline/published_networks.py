@@ -102,7 +102,7 @@ def published_network(fingerprint: str, title: str, scenes: str) -> PublishedNet
     if fingerprint not in known:
         other = f"training.scenes={SCENES}, the split of all of them, or "
         raise UserError(
-            f"networks=published: the package has no {title} of these settings{_seeds(title)}; "
+            f"networks=published: the package has no {title} of these settings; {_seeds(title)}"
             f"give {other if scenes != SCENES else ''}networks=trained, or the settings of a "
             f"network of {FOLDER}"
         )
@@ -117,7 +117,7 @@ def _seeds(title: str) -> str:
     seeds = sorted({number for own in same for number in seed.findall(own)}, key=int)
     if not seeds or title in same:
         return ""
-    return f", but with train_seed {', '.join(seeds)}"
+    return f"of this name it has train_seed {', '.join(seeds)}; "
 
 
 def check_networks(value: str) -> None:

@@ -129,8 +129,8 @@ def _row(folder: Path) -> Row:
     sounds = cfg.get("sound")
     row["sound"] = joined_names([*map(str, sounds)]) if isinstance(sounds, dict) else None
     try:
-        row["condition"] = _condition(cfg)
-    except (AttributeError, TypeError, ValueError):  # damaged
+        row["condition"] = _condition(cfg) if cfg else None
+    except (AttributeError, LookupError, TypeError, ValueError):  # damaged
         row["condition"] = None
     changed = datetime.fromtimestamp((folder / _RESULTS).stat().st_mtime, UTC)
     return row | {"date": changed.strftime("%Y-%m-%d %H:%M"), "folder": str(folder)}
@@ -154,6 +154,8 @@ def _condition(cfg: Mapping[str, Any]) -> str:
         ends = dict.fromkeys(f"{own:g}" for own in microphone.get("snr", ()))
         named = noises[0] if len(noises) == 1 else f"{len(noises)}-recordings"
         found.append(f"noise={named} snr={' to '.join(ends)}")
+    if any(level := microphone.get("level", ())):
+        found.append(f"level={level[0]:g} to {level[1]:g}")
     if microphone.get("gain", 1) != 1:
         found.append(f"gain={microphone['gain']:.3g}")
     return " ".join(found)
