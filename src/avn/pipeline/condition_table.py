@@ -29,8 +29,6 @@ from avn.reporting.finished_run import read_episodes
 
 # Files of the table.
 CELLS, TABLE = "cells.csv", "table.md"
-
-
 # Groups that the caption names, with their settings.
 _WORLD = ("acoustics", "protocol", "split")
 
